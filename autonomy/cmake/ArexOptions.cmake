@@ -1,0 +1,50 @@
+# Compile options of every target of the house. It lives inside autonomy/ because autonomy builds alone.
+include_guard(GLOBAL)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g")
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  # ccache sees through precompiled headers only with these.
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${CCACHE})
+endif()
+
+find_package(Eigen3 3.4 REQUIRED)
+find_package(Threads REQUIRED)
+
+add_library(arex_options INTERFACE)
+# x86-64-v3 for speed on every AVX2 host; no contraction and no fast-math, so that results are the
+# same on all of them. EIGEN_MAX_ALIGN_BYTES=16 keeps Eigen's layout that of Debian's PCL.
+target_compile_options(arex_options INTERFACE
+  -march=x86-64-v3 -ffp-contract=off -fpch-preprocess
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+  $<$<BOOL:${AREX_WERROR}>:-Werror>
+  $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)
+target_link_options(arex_options INTERFACE $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined>)
+target_compile_definitions(arex_options INTERFACE
+  EIGEN_MAX_ALIGN_BYTES=16
+  $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN>)
+target_link_libraries(arex_options INTERFACE Eigen3::Eigen Threads::Threads)
+
+# Eigen and the heaviest std headers, precompiled once and reused by every target that asks.
+add_library(arex_pch STATIC ${CMAKE_CURRENT_LIST_DIR}/pch.cpp)
+target_link_libraries(arex_pch PUBLIC arex_options)
+target_precompile_headers(arex_pch PRIVATE
+  <Eigen/Core> <Eigen/Geometry> <Eigen/Dense> <algorithm> <array> <cmath> <cstdint> <functional>
+  <map> <memory> <string> <unordered_map> <vector>)
+
+# arex_library(NAME sources...): a static library with the house's options and precompiled header.
+function(arex_library name)
+  add_library(${name} STATIC ${ARGN})
+  target_link_libraries(${name} PUBLIC arex_options)
+  target_precompile_headers(${name} REUSE_FROM arex_pch)
+endfunction()

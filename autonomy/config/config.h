@@ -1,0 +1,230 @@
+#pragma once
+
+#include <concepts>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "math/types.h"
+
+/// Strict configuration: YAML <-> struct. A config struct lists its fields once, in
+///
+///     void fields(auto& f) {
+///       f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+///       f.check(inflation_m >= 0, "inflation_m >= 0");
+///     }
+///
+/// and reading, writing, `arex params` and `--set` all come from that list. The default member
+/// initialiser is the only home of the number. Field types: bool, int, std::uint64_t, double,
+/// std::string, Vec2, Vec3, enums with an `enum_names` overload, std::vector of any of these, and
+/// nested config structs. Units are the name's suffix (_m, _mps, _rad, _hz, ...).
+namespace arex {
+
+/// Bad input. what() is one line, `FILE:LINE: what is wrong, what is expected`.
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A parsed YAML value that remembers where it stands.
+struct ConfigNode {
+  enum class Kind { kNull, kScalar, kMap, kSequence };
+  struct Entry;
+  Kind kind = Kind::kNull;
+  std::string where;  ///< "FILE:LINE", or "--set key"
+  std::string scalar;
+  std::vector<Entry> entries;     ///< of a map, in the file's order
+  std::vector<ConfigNode> items;  ///< of a sequence
+
+  [[nodiscard]] const ConfigNode* find(std::string_view key) const;
+};
+struct ConfigNode::Entry {
+  std::string key;
+  std::string where;
+  ConfigNode value;
+};
+
+/// Reads a file. @throws ConfigError for a missing file, a syntax error or a duplicate key.
+ConfigNode load_yaml(const std::filesystem::path& file);
+/// The same from text; `name` stands for the file in messages.
+ConfigNode parse_yaml(const std::string& text, const std::string& name);
+/// Applies one `--set a.b=value` over what the file says. @throws ConfigError if it has no '='.
+void apply_override(ConfigNode& root, const std::string& assignment);
+
+/// One parameter, as `arex params` prints it.
+struct ParameterInfo {
+  std::string key;  ///< dotted
+  std::string value;
+  std::string unit;  ///< from the name's suffix; empty if it has none
+  std::string meaning;
+};
+
+template <class T>
+concept ConfigEnum = std::is_enum_v<T> && requires(T t) { enum_names(t).size(); };
+
+namespace config_detail {
+
+[[noreturn]] void fail(const std::string& where, const std::string& message);
+void parse_scalar(const ConfigNode& node, std::string_view key, bool& out);
+void parse_scalar(const ConfigNode& node, std::string_view key, int& out);
+void parse_scalar(const ConfigNode& node, std::string_view key, std::uint64_t& out);
+void parse_scalar(const ConfigNode& node, std::string_view key, double& out);
+void parse_scalar(const ConfigNode& node, std::string_view key, std::string& out);
+std::size_t parse_choice(const ConfigNode& node, std::string_view key,
+                         const std::vector<std::string_view>& names);
+void expect_kind(const ConfigNode& node, std::string_view key, ConfigNode::Kind kind,
+                 std::string_view expected);
+void expect_length(const ConfigNode& node, std::string_view key, std::size_t length);
+/// Throws for the first key of `node` that is not in `known`, naming the nearest known one.
+void reject_unknown(const ConfigNode& node, const std::vector<std::string>& known);
+/// Where the value that a broken rule speaks of was given: the first known key named in the rule.
+std::string locate_rule(const ConfigNode& node, std::string_view rule);
+
+std::string format_scalar(bool value);
+std::string format_scalar(int value);
+std::string format_scalar(std::uint64_t value);
+std::string format_scalar(double value);
+std::string format_scalar(const std::string& value);
+std::string unit_of(std::string_view name);
+
+template <class T>
+inline constexpr bool kIsVector = false;
+template <class T>
+inline constexpr bool kIsVector<std::vector<T>> = true;
+template <class T>
+inline constexpr bool kIsEigen = std::is_same_v<T, Vec2> || std::is_same_v<T, Vec3>;
+template <class T>
+inline constexpr bool kIsScalar =
+    std::is_same_v<T, bool> || std::is_same_v<T, int> || std::is_same_v<T, std::uint64_t> ||
+    std::is_same_v<T, double> || std::is_same_v<T, std::string>;
+
+template <class T>
+void read_value(const ConfigNode& node, std::string_view key, T& value);
+
+/// The `f` of fields() that reads a struct from a map.
+class Reader {
+ public:
+  explicit Reader(const ConfigNode& node) : node_(node) {}
+
+  void operator()(std::string_view name, auto& value, std::string_view /*meaning*/) {
+    known_.emplace_back(name);
+    if (const ConfigNode* child = node_.find(name)) read_value(*child, name, value);
+  }
+  void check(bool holds, std::string_view rule) {
+    if (!holds && broken_.empty()) broken_ = rule;
+  }
+  /// @throws ConfigError for an unknown key, then for the first broken rule.
+  void finish() const {
+    reject_unknown(node_, known_);
+    if (!broken_.empty()) fail(locate_rule(node_, broken_), "out of range: expected " + broken_);
+  }
+
+ private:
+  const ConfigNode& node_;
+  std::vector<std::string> known_;
+  std::string broken_;
+};
+
+template <class T>
+void read_value(const ConfigNode& node, std::string_view key, T& value) {
+  if constexpr (kIsScalar<T>) {
+    parse_scalar(node, key, value);
+  } else if constexpr (ConfigEnum<T>) {
+    const auto& names = enum_names(value);
+    value = static_cast<T>(parse_choice(node, key, {names.begin(), names.end()}));
+  } else if constexpr (kIsEigen<T>) {
+    expect_length(node, key, static_cast<std::size_t>(value.size()));
+    for (Eigen::Index i = 0; i < value.size(); ++i) {
+      parse_scalar(node.items[static_cast<std::size_t>(i)], key, value[i]);
+    }
+  } else if constexpr (kIsVector<T>) {
+    expect_kind(node, key, ConfigNode::Kind::kSequence, "a list [..]");
+    value.clear();
+    for (const ConfigNode& item : node.items) read_value(item, key, value.emplace_back());
+  } else {
+    expect_kind(node, key, ConfigNode::Kind::kMap, "a map of keys");
+    Reader reader(node);
+    value.fields(reader);
+    reader.finish();
+  }
+}
+
+template <class T>
+std::string format_value(const T& value) {
+  if constexpr (kIsScalar<T>) {
+    return format_scalar(value);
+  } else if constexpr (ConfigEnum<T>) {
+    return std::string(enum_names(value)[static_cast<std::size_t>(value)]);
+  } else if constexpr (kIsEigen<T>) {
+    std::string text = "[";
+    for (Eigen::Index i = 0; i < value.size(); ++i) {
+      text += (i ? ", " : "") + format_scalar(value[i]);
+    }
+    return text + "]";
+  } else if constexpr (kIsVector<T>) {
+    std::string text = "[";
+    for (const auto& item : value) text += (text.size() > 1 ? ", " : "") + format_value(item);
+    return text + "]";
+  } else {
+    struct FlowWriter {
+      std::string text;
+      void operator()(std::string_view name, auto& field, std::string_view) {
+        text += (text.empty() ? "" : ", ") + std::string(name) + ": " + format_value(field);
+      }
+      void check(bool, std::string_view) {}
+    } writer;
+    T copy = value;
+    copy.fields(writer);
+    return "{" + writer.text + "}";
+  }
+}
+
+/// The `f` of fields() that lists every leaf with its dotted key.
+class Lister {
+ public:
+  Lister(std::string prefix, std::vector<ParameterInfo>& out)
+      : prefix_(std::move(prefix)), out_(out) {}
+
+  template <class T>
+  void operator()(std::string_view name, T& value, std::string_view meaning) {
+    const std::string key = prefix_ + std::string(name);
+    if constexpr (kIsScalar<T> || ConfigEnum<T> || kIsEigen<T> || kIsVector<T>) {
+      out_.push_back({key, format_value(value), unit_of(name), std::string(meaning)});
+    } else {
+      Lister nested(key + ".", out_);
+      value.fields(nested);
+    }
+  }
+  void check(bool, std::string_view) {}
+
+ private:
+  std::string prefix_;
+  std::vector<ParameterInfo>& out_;
+};
+
+}  // namespace config_detail
+
+/// Fills `config` from a map; keys that are absent keep their defaults. @throws ConfigError.
+template <class T>
+void read_config(const ConfigNode& node, T& config) {
+  config_detail::read_value(node, "the file", config);
+}
+
+/// Every leaf of a config struct in the order of its fields.
+template <class T>
+std::vector<ParameterInfo> list_parameters(T config) {
+  std::vector<ParameterInfo> out;
+  config_detail::Lister lister("", out);
+  config.fields(lister);
+  return out;
+}
+
+/// The block YAML of a list of parameters; reading it back gives the same bits.
+std::string write_yaml(const std::vector<ParameterInfo>& parameters);
+
+}  // namespace arex

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "math/pose.h"
+#include "math/types.h"
+
+/// What the modules of the stack tell each other.
+namespace arex {
+
+/// Health of an odometry source.
+enum class OdometryStatus { kInitialising, kOk, kDegenerate, kLost };
+
+/// Pose and velocity of B in O at `stamp`.
+struct Odometry {
+  Stamp stamp = 0;
+  Stamp correction_stamp = 0;  ///< of the newest measurement other than the IMU that it contains
+  Pose X_OB;
+  Vec3 v_OB = Vec3::Zero();    ///< m/s, in O
+  Vec3 w_OB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
+  OdometryStatus status = OdometryStatus::kInitialising;
+};
+
+/// The autopilot's own attitude estimate; its heading reference A differs from O's by a yaw.
+struct AttitudeEstimate {
+  Stamp stamp = 0;
+  Mat3 R_AB = Mat3::Identity();
+  Vec3 w_AB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
+};
+
+/// Where the vehicle should be at one moment, in O.
+struct TrajectorySetpoint {
+  Vec3 p_OB = Vec3::Zero();
+  Vec3 v_OB = Vec3::Zero();
+  Vec3 a_OB = Vec3::Zero();
+  double yaw_rad = 0;
+  double yaw_rate_radps = 0;
+};
+
+}  // namespace arex

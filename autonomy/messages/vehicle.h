@@ -1,0 +1,50 @@
+#pragma once
+
+#include <numbers>
+
+#include "math/pose.h"
+#include "math/types.h"
+
+namespace arex {
+
+/// What the stack knows of its vehicle by weighing, measuring and calibrating: the belief, not the
+/// truth (models/arex/arex.xml). A test holds the two together.
+struct VehicleConfig {
+  double mass_kg = 1.9;                     ///< paper, III-A
+  Vec3 rotor_offset_m{0.095, 0.1645, 0.0};  ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
+  double thrust_coefficient = 9.1e-6;       ///< kT, N/(rad/s)^2
+  double torque_ratio_m = 0.0143;           ///< rotor drag torque per thrust
+  double radius_m = 0.30;                   ///< of the sphere about B that holds the airframe, propellers included
+  double ground_offset_m = 0.14;            ///< height of B above the ground when standing
+  Vec3 lidar_position_m{0.15, 0.0, 0.01};   ///< p_BL
+  double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
+  Vec3 camera_position_m{0.14, 0.0, 0.07};  ///< p_BC, the left imager: above the LiDAR (paper, III-A)
+  double camera_pitch_rad = 0.0;            ///< positive looks down
+
+  /// LiDAR frame in B: rotated about y.
+  [[nodiscard]] Pose X_BL() const { return {so3::Exp({0, lidar_pitch_rad, 0}), lidar_position_m}; }
+  /// Camera frame in B: z forward, x right, y down.
+  [[nodiscard]] Pose X_BC() const {
+    Mat3 R_forward;
+    R_forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    return {so3::Exp({0, camera_pitch_rad, 0}) * R_forward, camera_position_m};
+  }
+
+  void fields(auto& f) {
+    f("mass_kg", mass_kg, "all-up mass (paper, III-A)");
+    f("rotor_offset_m", rotor_offset_m, "|x|, |y|, z of each rotor in B");
+    f("thrust_coefficient", thrust_coefficient, "rotor thrust per squared speed, N/(rad/s)^2");
+    f("torque_ratio_m", torque_ratio_m, "rotor drag torque per thrust");
+    f("radius_m", radius_m, "sphere about B that holds the airframe");
+    f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
+    f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
+    f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, III-A)");
+    f("camera_position_m", camera_position_m, "left imager in B");
+    f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
+    f.check(mass_kg > 0, "mass_kg > 0");
+    f.check(radius_m > 0, "radius_m > 0");
+    f.check(thrust_coefficient > 0, "thrust_coefficient > 0");
+  }
+};
+
+}  // namespace arex

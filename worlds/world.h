@@ -8,20 +8,35 @@
 #include "math/pose.h"
 #include "math/types.h"
 
-/// Procedural worlds: a recipe and a seed give one labelled triangle mesh, a few collision shapes and
-/// the free space. Built once, constant after; Embree, the depth renderer, the physics, the scorer and
-/// the exporter all read this one value. Frame W: z up, m.
+/// Procedural worlds: a recipe and a seed give one labelled triangle mesh, a few collision shapes
+/// and the free space. Built once, constant after; Embree, the depth renderer, the physics, the
+/// scorer and the exporter all read this one value. Frame W: z up, m.
 namespace arex::worlds {
 
 enum class SurfaceClass : std::uint8_t {
-  kGround, kTrunk, kBranch, kLeaf, kShrub, kLog,
-  kFloor, kRamp, kWall, kCeiling, kPillar, kBeam, kPipe, kCar, kKerb, kDoor,
+  kGround,
+  kTrunk,
+  kBranch,
+  kLeaf,
+  kShrub,
+  kLog,
+  kFloor,
+  kRamp,
+  kWall,
+  kCeiling,
+  kPillar,
+  kBeam,
+  kPipe,
+  kCar,
+  kKerb,
+  kDoor,
 };
 inline constexpr std::array<std::string_view, 16> kSurfaceClassNames{
-    "ground", "trunk", "branch", "leaf", "shrub", "log",  "floor", "ramp",
-    "wall",   "ceiling", "pillar", "beam", "pipe", "car", "kerb", "door"};
+    "ground", "trunk",   "branch", "leaf", "shrub", "log", "floor", "ramp",
+    "wall",   "ceiling", "pillar", "beam", "pipe",  "car", "kerb",  "door"};
 
-/// One thing of the world: a tree's trunk, one car, the ground. Its id is its index in World::objects.
+/// One thing of the world: a tree's trunk, one car, the ground. Its id is its index in
+/// World::objects.
 struct Object {
   SurfaceClass surface_class = SurfaceClass::kGround;
   float reflectivity = 0.3F;  ///< diffuse, at 905 nm, 0..1
@@ -52,14 +67,14 @@ struct CollisionShape {
   std::uint32_t object = 0;
 };
 
-/// Terrain on a regular grid, bilinear over triangles split along the (0,0)-(1,1) diagonal as in the
-/// mesh. Empty (columns == 0) where the ground is made of shapes (garage).
+/// Terrain on a regular grid, bilinear over triangles split along the (0,0)-(1,1) diagonal as in
+/// the mesh. Empty (columns == 0) where the ground is made of shapes (garage).
 struct HeightField {
   Vec2 origin = Vec2::Zero();  ///< x, y of sample (0, 0), m
   double spacing_m = 0;
-  int columns = 0;             ///< along x
-  int rows = 0;                ///< along y
-  std::vector<float> height_m; ///< columns * rows, row-major: index = row * columns + column
+  int columns = 0;              ///< along x
+  int rows = 0;                 ///< along y
+  std::vector<float> height_m;  ///< columns * rows, row-major: index = row * columns + column
 
   /// Height of the surface at (x, y), clamped to the border outside.
   [[nodiscard]] double at(double x, double y) const;
@@ -80,7 +95,8 @@ struct World {
   std::vector<CollisionShape> collision_shapes;
   HeightField terrain;
   Bounds bounds;  ///< of the whole world, m
-  Pose X_WS;      ///< the start pad S: on the ground, z up, x the vehicle's heading; free around and above it
+  Pose X_WS;  ///< the start pad S: on the ground, z up, x the vehicle's heading; free around and
+              ///< above it
 
   [[nodiscard]] SurfaceClass class_of_triangle(std::size_t triangle) const {
     return objects[mesh.object_of_triangle[triangle]].surface_class;

@@ -65,7 +65,9 @@ struct ParameterInfo {
 };
 
 template <class T>
-concept ConfigEnum = std::is_enum_v<T> && requires(T t) { enum_names(t).size(); };
+concept ConfigEnum = std::is_enum_v<T> && requires(T t) {
+  enum_names(t).size();
+};
 
 namespace config_detail {
 

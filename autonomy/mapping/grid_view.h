@@ -8,9 +8,9 @@
 namespace arex {
 
 /// What the planner sees of the local grid: a dense box of cells in O, read only.
-/// One byte per cell: bit 0 occupied, bit 1 inside the inflation, bit 2 known (seen free or occupied).
-/// Index as the paper's Id_i: (h * num_w + w) * num_l + l with l along y, w along x, h along z
-/// (paper, Environment Representation).
+/// One byte per cell: bit 0 occupied, bit 1 inside the inflation, bit 2 known (seen free or
+/// occupied). Index as the paper's Id_i: (h * num_w + w) * num_l + l with l along y, w along x, h
+/// along z (paper, Environment Representation).
 struct GridView {
   static constexpr std::uint8_t kOccupied = 1;
   static constexpr std::uint8_t kInflated = 2;
@@ -41,7 +41,9 @@ struct GridView {
     const Eigen::Vector3i cell = cell_of(p);
     return contains(cell) ? cells[index(cell)] : std::uint8_t{0};
   }
-  [[nodiscard]] bool inflated(const Vec3& p) const { return (at(p) & (kInflated | kOccupied)) != 0; }
+  [[nodiscard]] bool inflated(const Vec3& p) const {
+    return (at(p) & (kInflated | kOccupied)) != 0;
+  }
   [[nodiscard]] bool known(const Vec3& p) const { return (at(p) & kKnown) != 0; }
 };
 

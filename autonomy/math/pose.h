@@ -5,7 +5,8 @@
 
 namespace arex {
 
-/// A rigid transform X_AB: the pose of frame B in frame A. Inner letters cancel: X_AC = X_AB * X_BC.
+/// A rigid transform X_AB: the pose of frame B in frame A. Inner letters cancel: X_AC = X_AB *
+/// X_BC.
 struct Pose {
   Mat3 R = Mat3::Identity();  ///< R_AB: columns are B's axes in A
   Vec3 p = Vec3::Zero();      ///< p_AB: B's origin in A, m

@@ -79,8 +79,8 @@ double RandomStream::normal() {
         if (2 * y > x * x) return u > 0 ? Ziggurat::kTail + x : -(Ziggurat::kTail + x);
       }
     }
-    const double height = ziggurat.f[layer + 1] +
-                          uniform() * (ziggurat.f[layer] - ziggurat.f[layer + 1]);
+    const double height =
+        ziggurat.f[layer + 1] + uniform() * (ziggurat.f[layer] - ziggurat.f[layer + 1]);
     if (height < std::exp(-0.5 * value * value)) return value;
   }
 }

@@ -17,7 +17,7 @@ Mat3 hat(const Vec3& a) {
 
 Mat3 Exp(const Vec3& phi) {
   const double theta2 = phi.squaredNorm();
-  double a = 1 - theta2 / 6;    // sin(theta) / theta
+  double a = 1 - theta2 / 6;     // sin(theta) / theta
   double b = 0.5 - theta2 / 24;  // (1 - cos(theta)) / theta^2
   if (theta2 > kSmallAngleSquared) {
     const double theta = std::sqrt(theta2);
@@ -39,8 +39,8 @@ Vec3 Log(const Mat3& R) {
 
 Mat3 right_jacobian(const Vec3& phi) {
   const double theta2 = phi.squaredNorm();
-  double b = 0.5 - theta2 / 24;        // (1 - cos(theta)) / theta^2
-  double c = 1.0 / 6 - theta2 / 120;   // (theta - sin(theta)) / theta^3
+  double b = 0.5 - theta2 / 24;       // (1 - cos(theta)) / theta^2
+  double c = 1.0 / 6 - theta2 / 120;  // (theta - sin(theta)) / theta^3
   if (theta2 > kSmallAngleSquared) {
     const double theta = std::sqrt(theta2);
     const double half_sine = std::sin(theta / 2);

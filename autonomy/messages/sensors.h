@@ -13,8 +13,8 @@ namespace arex {
 /// One sample of the autopilot's IMU, in B.
 struct ImuSample {
   Stamp stamp = 0;
-  Vec3 gyro_radps = Vec3::Zero();   ///< angular rate of B, rad/s
-  Vec3 accel_mps2 = Vec3::Zero();   ///< specific force, m/s^2: +g along z at rest on level ground
+  Vec3 gyro_radps = Vec3::Zero();  ///< angular rate of B, rad/s
+  Vec3 accel_mps2 = Vec3::Zero();  ///< specific force, m/s^2: +g along z at rest on level ground
 };
 
 /// Magnetometer and barometer of the autopilot.
@@ -36,11 +36,11 @@ struct BatterySample {
 
 /// One LiDAR return. Points without a return are not in the scan.
 struct LidarPoint {
-  Vec3f p_L = Vec3f::Zero();     ///< in the LiDAR's frame at the point's own time, m
-  float intensity = 0;           ///< reflectivity as the device reports it, 0..255
-  std::uint32_t offset_ns = 0;   ///< since the scan's stamp
-  std::uint8_t line = 0;         ///< laser line, 0..3
-  std::uint8_t tag = 0;          ///< the device's confidence tag; 0 normal
+  Vec3f p_L = Vec3f::Zero();    ///< in the LiDAR's frame at the point's own time, m
+  float intensity = 0;          ///< reflectivity as the device reports it, 0..255
+  std::uint32_t offset_ns = 0;  ///< since the scan's stamp
+  std::uint8_t line = 0;        ///< laser line, 0..3
+  std::uint8_t tag = 0;         ///< the device's confidence tag; 0 normal
 };
 
 /// One LiDAR frame: everything fired in [stamp, end), in firing order, distorted by the motion.

@@ -10,16 +10,18 @@ namespace arex {
 /// What the stack knows of its vehicle by weighing, measuring and calibrating: the belief, not the
 /// truth (models/arex/arex.xml). A test holds the two together.
 struct VehicleConfig {
-  double mass_kg = 1.9;                     ///< paper, III-A
-  Vec3 rotor_offset_m{0.095, 0.1645, 0.0};  ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
-  double thrust_coefficient = 9.1e-6;       ///< kT, N/(rad/s)^2
-  double torque_ratio_m = 0.0143;           ///< rotor drag torque per thrust
-  double radius_m = 0.30;                   ///< of the sphere about B that holds the airframe, propellers included
-  double ground_offset_m = 0.14;            ///< height of B above the ground when standing
-  Vec3 lidar_position_m{0.15, 0.0, 0.01};   ///< p_BL
+  double mass_kg = 1.9;  ///< paper, III-A
+  Vec3 rotor_offset_m{0.095, 0.1645,
+                      0.0};            ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
+  double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
+  double torque_ratio_m = 0.0143;      ///< rotor drag torque per thrust
+  double radius_m = 0.30;  ///< of the sphere about B that holds the airframe, propellers included
+  double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
+  Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
   double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
-  Vec3 camera_position_m{0.14, 0.0, 0.07};  ///< p_BC, the left imager: above the LiDAR (paper, III-A)
-  double camera_pitch_rad = 0.0;            ///< positive looks down
+  Vec3 camera_position_m{0.14, 0.0,
+                         0.07};   ///< p_BC, the left imager: above the LiDAR (paper, III-A)
+  double camera_pitch_rad = 0.0;  ///< positive looks down
 
   /// LiDAR frame in B: rotated about y.
   [[nodiscard]] Pose X_BL() const { return {so3::Exp({0, lidar_pitch_rad, 0}), lidar_position_m}; }

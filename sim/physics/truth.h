@@ -13,10 +13,11 @@ namespace arex::sim {
 struct Truth {
   Stamp stamp = 0;
   Pose X_WB;
-  Vec3 v_WB = Vec3::Zero();         ///< velocity of B's origin, m/s, in W
-  Vec3 w_WB_B = Vec3::Zero();       ///< angular rate, rad/s, in B
-  Vec3 a_WB = Vec3::Zero();         ///< acceleration of B's origin over the last tick, m/s^2, in W (no gravity term)
-  Vec3 alpha_WB_B = Vec3::Zero();   ///< angular acceleration over the last tick, rad/s^2, in B
+  Vec3 v_WB = Vec3::Zero();    ///< velocity of B's origin, m/s, in W
+  Vec3 w_WB_B = Vec3::Zero();  ///< angular rate, rad/s, in B
+  Vec3 a_WB = Vec3::Zero();    ///< acceleration of B's origin over the last tick, m/s^2, in W (no
+                               ///< gravity term)
+  Vec3 alpha_WB_B = Vec3::Zero();       ///< angular acceleration over the last tick, rad/s^2, in B
   std::array<double, 4> rotor_radps{};  ///< rotor speeds, always positive
 };
 

@@ -157,6 +157,18 @@ void read_value(const ConfigNode& node, std::string_view key, T& value) {
 }
 
 template <class T>
+std::string format_value(const T& value);
+
+/// The `f` of fields() that writes a struct as a flow map, for structs inside lists.
+struct FlowWriter {
+  std::string text;
+  void operator()(std::string_view name, auto& field, std::string_view /*meaning*/) {
+    text += (text.empty() ? "" : ", ") + std::string(name) + ": " + format_value(field);
+  }
+  void check(bool, std::string_view) {}
+};
+
+template <class T>
 std::string format_value(const T& value) {
   if constexpr (kIsScalar<T>) {
     return format_scalar(value);
@@ -173,13 +185,7 @@ std::string format_value(const T& value) {
     for (const auto& item : value) text += (text.size() > 1 ? ", " : "") + format_value(item);
     return text + "]";
   } else {
-    struct FlowWriter {
-      std::string text;
-      void operator()(std::string_view name, auto& field, std::string_view) {
-        text += (text.empty() ? "" : ", ") + std::string(name) + ": " + format_value(field);
-      }
-      void check(bool, std::string_view) {}
-    } writer;
+    FlowWriter writer;
     T copy = value;
     copy.fields(writer);
     return "{" + writer.text + "}";

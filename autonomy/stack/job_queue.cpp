@@ -1,0 +1,131 @@
+#include "stack/job_queue.h"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+namespace arex {
+namespace {
+
+// CPU time of this thread: what the work cost, however busy the host was.
+double thread_seconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+}  // namespace
+
+JobQueue::JobQueue(int threads) {
+  for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { run_worker(); });
+}
+
+JobQueue::~JobQueue() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  work_available_.notify_all();
+  for (std::thread& worker : workers_) worker.join();
+}
+
+JobQueue::Lane JobQueue::add_lane(std::string name) {
+  const std::lock_guard lock(mutex_);
+  lanes_.emplace_back().name = std::move(name);
+  return lanes_.size() - 1;
+}
+
+Stamp JobQueue::start(Lane lane, Stamp now, Stamp latency, Work work) {
+  auto job = std::make_shared<Job>();
+  job->lane = lane;
+  job->work = std::move(work);
+  std::unique_lock lock(mutex_);
+  LaneState& state = lanes_.at(lane);
+  job->visible_at = std::max(now, state.free_at) + latency;
+  state.free_at = job->visible_at;
+  const auto position = std::upper_bound(
+      pending_.begin(), pending_.end(), job,
+      [](const JobPtr& a, const JobPtr& b) { return a->visible_at < b->visible_at; });
+  pending_.insert(position, job);
+  state.waiting.push_back(job);
+  if (workers_.empty()) {
+    run_one(lock, lane);
+  } else {
+    work_available_.notify_one();
+  }
+  return job->visible_at;
+}
+
+void JobQueue::advance(Stamp now) {
+  for (;;) {
+    std::unique_lock lock(mutex_);
+    if (pending_.empty() || pending_.front()->visible_at > now) return;
+    const JobPtr job = pending_.front();
+    // Help instead of idling: the caller's thread is one of the host threads.
+    while (!job->done) {
+      if (!run_one(lock, job->lane)) job_done_.wait(lock);
+    }
+    pending_.erase(pending_.begin());
+    lock.unlock();
+    if (job->error) std::rethrow_exception(job->error);
+    if (job->delivery) job->delivery();
+  }
+}
+
+bool JobQueue::is_free(Lane lane, Stamp now) const {
+  const std::lock_guard lock(mutex_);
+  return lanes_.at(lane).free_at <= now;
+}
+
+std::vector<JobQueue::LaneTiming> JobQueue::timings() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<LaneTiming> out;
+  for (const LaneState& lane : lanes_) out.push_back({lane.name, lane.seconds});
+  return out;
+}
+
+void JobQueue::execute(Job& job) {
+  const double begin = thread_seconds();
+  try {
+    job.delivery = job.work();
+  } catch (...) {
+    job.error = std::current_exception();
+  }
+  job.work = nullptr;  // lets go of its inputs
+  job.seconds = static_cast<float>(thread_seconds() - begin);
+}
+
+// Runs the next job of a lane on this thread. @return false if there is none or it is being run.
+bool JobQueue::run_one(std::unique_lock<std::mutex>& lock, Lane lane) {
+  if (lanes_[lane].running || lanes_[lane].waiting.empty()) return false;
+  const JobPtr job = lanes_[lane].waiting.front();
+  lanes_[lane].waiting.pop_front();
+  lanes_[lane].running = true;
+  lock.unlock();
+  execute(*job);
+  lock.lock();
+  lanes_[lane].running = false;  // lanes_ may have grown meanwhile: no reference is kept
+  lanes_[lane].seconds.push_back(job->seconds);
+  job->done = true;
+  job_done_.notify_all();
+  if (!lanes_[lane].waiting.empty()) work_available_.notify_one();
+  return true;
+}
+
+void JobQueue::run_worker() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    // The job that will be waited for first is run first.
+    const auto next = std::find_if(pending_.begin(), pending_.end(), [&](const JobPtr& job) {
+      const LaneState& lane = lanes_[job->lane];
+      return !lane.running && !lane.waiting.empty() && lane.waiting.front() == job;
+    });
+    if (next == pending_.end()) {
+      work_available_.wait(lock);
+    } else {
+      run_one(lock, (*next)->lane);
+    }
+  }
+}
+
+}  // namespace arex

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "math/types.h"
+
+namespace arex {
+
+/// Heavy work with modelled compute time.
+///
+/// A job belongs to a lane: the thread that one module would have on the vehicle. It starts when
+/// its lane is free and its result becomes visible `latency` later, however long the host took. So
+/// what the rest of the system sees does not depend on the number of host threads or their speed.
+///
+/// Contract: a job may touch its lane's module and what it captured by value or shared const
+/// pointer; everything else waits for its delivery, which runs on the thread that calls advance().
+class JobQueue {
+ public:
+  using Delivery = std::function<void()>;
+  using Work = std::function<Delivery()>;
+  using Lane = std::size_t;
+
+  /// @param threads host threads in all, the caller's included: 1 runs every job inside start().
+  explicit JobQueue(int threads);
+  ~JobQueue();
+  JobQueue(const JobQueue&) = delete;
+  JobQueue& operator=(const JobQueue&) = delete;
+
+  Lane add_lane(std::string name);
+
+  /// Starts `work` at `now` or when the lane is free. @return the stamp at which it becomes
+  /// visible.
+  Stamp start(Lane lane, Stamp now, Stamp latency, Work work);
+
+  /// Delivers every result that is visible at `now`, in order of visibility, then of start.
+  /// Rethrows what a job threw.
+  void advance(Stamp now);
+
+  /// Whether the lane would start a job at `now` without queueing it.
+  [[nodiscard]] bool is_free(Lane lane, Stamp now) const;
+
+  /// Host seconds that each job took, by lane; for timing.csv only.
+  struct LaneTiming {
+    std::string name;
+    std::vector<float> seconds;
+  };
+  [[nodiscard]] std::vector<LaneTiming> timings() const;
+
+ private:
+  struct Job {
+    Stamp visible_at = 0;
+    Lane lane = 0;
+    Work work;
+    Delivery delivery;
+    std::exception_ptr error;
+    float seconds = 0;
+    bool done = false;
+  };
+  using JobPtr = std::shared_ptr<Job>;
+  struct LaneState {
+    std::string name;
+    Stamp free_at = 0;
+    std::deque<JobPtr> waiting;  ///< not yet run, in order
+    bool running = false;
+    std::vector<float> seconds;
+  };
+
+  static void execute(Job& job);
+  bool run_one(std::unique_lock<std::mutex>& lock, Lane lane);
+  void run_worker();
+
+  std::vector<LaneState> lanes_;
+  std::vector<JobPtr> pending_;  ///< not yet delivered, in delivery order
+  std::vector<std::thread> workers_;
+  mutable std::mutex mutex_;
+  std::condition_variable work_available_;
+  std::condition_variable job_done_;
+  bool stopping_ = false;
+};
+
+}  // namespace arex

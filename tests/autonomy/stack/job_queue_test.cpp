@@ -1,0 +1,100 @@
+#include "stack/job_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+
+#include "math/random.h"
+
+namespace arex {
+namespace {
+
+constexpr Stamp kMs = kNanosecondsPerTick;
+
+TEST(JobQueue, ResultsBecomeVisibleAtTheModelledTimeForAnyNumberOfThreads) {
+  for (const int threads : {1, 2, 4}) {
+    JobQueue jobs(threads);
+    const auto lane = jobs.add_lane("a");
+    bool visible = false;
+    jobs.start(lane, 0, 20 * kMs, [&] { return [&] { visible = true; }; });
+    jobs.advance(19 * kMs);
+    EXPECT_FALSE(visible);
+    jobs.advance(20 * kMs);
+    EXPECT_TRUE(visible);
+  }
+}
+
+TEST(JobQueue, ALaneRunsOneJobAfterTheOther) {
+  JobQueue jobs(4);
+  const auto lane = jobs.add_lane("a");
+  std::atomic<int> inside{0};
+  std::vector<Stamp> visible_at;
+  for (int i = 0; i < 20; ++i) {
+    visible_at.push_back(jobs.start(lane, 0, 5 * kMs, [&inside] {
+      EXPECT_EQ(++inside, 1);
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+      --inside;
+      return JobQueue::Delivery{};
+    }));
+  }
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(visible_at[static_cast<std::size_t>(i)], (i + 1) * 5 * kMs);
+  EXPECT_FALSE(jobs.is_free(lane, 99 * kMs));
+  EXPECT_TRUE(jobs.is_free(lane, 100 * kMs));
+  jobs.advance(100 * kMs);
+  EXPECT_EQ(jobs.timings().at(0).seconds.size(), 20u);
+}
+
+// The whole point: random jobs on several lanes, whose deliveries start new jobs, give one and the
+// same sequence of deliveries with 1, 2 and 4 threads.
+TEST(JobQueue, DeliveriesAreTheSameForAnyNumberOfThreads) {
+  auto run = [](int threads, std::uint64_t seed) {
+    JobQueue jobs(threads);
+    std::vector<JobQueue::Lane> lanes;
+    for (int i = 0; i < 3; ++i) lanes.push_back(jobs.add_lane("lane"));
+    std::vector<std::uint64_t> log;
+    RandomStream random(seed, "jobs");
+    for (Stamp now = 0; now < 300 * kMs; now += kMs) {
+      jobs.advance(now);
+      if (random.uniform() < 0.2) {
+        const auto lane = lanes[static_cast<std::size_t>(random.uniform_int(0, 2))];
+        const Stamp latency = random.uniform_int(0, 30) * kMs;
+        const std::uint64_t value = random.bits();
+        const auto spin = std::chrono::microseconds(random.uniform_int(0, 300));
+        jobs.start(lane, now, latency, [&, value, now, spin]() -> JobQueue::Delivery {
+          std::this_thread::sleep_for(spin);
+          return [&, value, now] {
+            log.push_back(value);
+            if (value % 3 == 0) {
+              jobs.start(lanes[0], now + 40 * kMs, 2 * kMs, [&, value]() -> JobQueue::Delivery {
+                return [&, value] { log.push_back(value + 1); };
+              });
+            }
+          };
+        });
+      }
+    }
+    jobs.advance(1000 * kMs);
+    return log;
+  };
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const auto alone = run(1, seed);
+    EXPECT_GT(alone.size(), 30u);
+    EXPECT_EQ(alone, run(2, seed));
+    EXPECT_EQ(alone, run(4, seed));
+  }
+}
+
+TEST(JobQueue, RethrowsWhatAJobThrew) {
+  for (const int threads : {1, 3}) {
+    JobQueue jobs(threads);
+    const auto lane = jobs.add_lane("a");
+    jobs.start(lane, 0, kMs, []() -> JobQueue::Delivery { throw std::runtime_error("broken"); });
+    EXPECT_THROW(jobs.advance(kMs), std::runtime_error);
+  }
+}
+
+}  // namespace
+}  // namespace arex

@@ -1,0 +1,71 @@
+#include "scoring/odometry_error.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace arex::sim {
+
+Pose align_at_start(const std::vector<PosePair>& pairs) {
+  if (pairs.empty()) return {};
+  return pairs.front().X_WB * pairs.front().X_OB.inverse();
+}
+
+Pose align_rigid(const std::vector<PosePair>& pairs) {
+  if (pairs.size() < 3) return align_at_start(pairs);
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Matrix3Xd estimated(3, count);
+  Eigen::Matrix3Xd truth(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    estimated.col(i) = pairs[static_cast<std::size_t>(i)].X_OB.p;
+    truth.col(i) = pairs[static_cast<std::size_t>(i)].X_WB.p;
+  }
+  const Eigen::Matrix4d T = Eigen::umeyama(estimated, truth, /*with_scaling=*/false);
+  return {T.topLeftCorner<3, 3>(), T.topRightCorner<3, 1>()};
+}
+
+double relative_error(const std::vector<PosePair>& pairs, double path_m, std::size_t stride) {
+  std::vector<double> travelled(pairs.size(), 0.0);
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    travelled[i] = travelled[i - 1] + (pairs[i].X_WB.p - pairs[i - 1].X_WB.p).norm();
+  }
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0, j = 0; i < pairs.size(); i += stride) {
+    while (j < pairs.size() && travelled[j] < travelled[i] + path_m) ++j;
+    if (j == pairs.size()) break;
+    const Pose true_step = pairs[i].X_WB.inverse() * pairs[j].X_WB;
+    const Pose estimated_step = pairs[i].X_OB.inverse() * pairs[j].X_OB;
+    sum += (true_step.inverse() * estimated_step).p.squaredNorm();
+    ++count;
+  }
+  return count ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+}
+
+OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
+  OdometryScore score;
+  if (pairs.empty()) return score;
+  const Pose X_WO_start = align_at_start(pairs);
+  const Pose X_WO_best = align_rigid(pairs);
+  double sum_start = 0;
+  double sum_best = 0;
+  double yaw_max = 0;
+  for (const PosePair& pair : pairs) {
+    const Pose aligned = X_WO_start * pair.X_OB;
+    const double error2 = (aligned.p - pair.X_WB.p).squaredNorm();
+    sum_start += error2;
+    sum_best += (X_WO_best * pair.X_OB.p - pair.X_WB.p).squaredNorm();
+    score.ate_max_m = std::max(score.ate_max_m, std::sqrt(error2));
+    yaw_max = std::max(yaw_max, std::abs(so3::wrap(so3::yaw(aligned.R) - so3::yaw(pair.X_WB.R))));
+  }
+  const auto count = static_cast<double>(pairs.size());
+  score.ate_rmse_m = std::sqrt(sum_start / count);
+  score.ate_se3_rmse_m = std::sqrt(sum_best / count);
+  score.yaw_error_max_deg = yaw_max * 180 / std::numbers::pi;
+  score.rpe_1m_m = relative_error(pairs, 1.0);
+  score.rpe_10m_m = relative_error(pairs, 10.0);
+  return score;
+}
+
+}  // namespace arex::sim

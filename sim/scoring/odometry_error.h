@@ -1,0 +1,41 @@
+#pragma once
+
+#include <vector>
+
+#include "math/pose.h"
+#include "math/types.h"
+
+namespace arex::sim {
+
+/// Truth and estimate at one moment. W and O need not coincide.
+struct PosePair {
+  Stamp stamp = 0;
+  Pose X_WB;  ///< true
+  Pose X_OB;  ///< estimated
+};
+
+/// How far an odometry is from the truth over one run. Definitions as in Zhang and Scaramuzza, A
+/// tutorial on quantitative trajectory evaluation, IROS 2018, and as `evo` computes them.
+struct OdometryScore {
+  double ate_rmse_m = 0;         ///< absolute position error, aligned at the first pose only
+  double ate_max_m = 0;          ///< its largest value
+  double ate_se3_rmse_m = 0;     ///< after the best rigid alignment of the whole run
+  double yaw_error_max_deg = 0;  ///< heading error, aligned at the first pose
+  double rpe_1m_m = 0;           ///< relative position error over 1 m of path, RMS
+  double rpe_10m_m = 0;          ///< the same over 10 m; 0 if the path is shorter
+};
+
+/// The pose of O in W that makes the first pair agree.
+Pose align_at_start(const std::vector<PosePair>& pairs);
+
+/// The rigid transform X_WO that minimises the squared position error (Umeyama without scale).
+Pose align_rigid(const std::vector<PosePair>& pairs);
+
+/// RMS of the relative position error over all sub-paths of true length `path_m`.
+/// @param stride every stride-th pose starts a sub-path.
+double relative_error(const std::vector<PosePair>& pairs, double path_m, std::size_t stride = 10);
+
+/// @pre pairs are in order of time. An empty run scores zero.
+OdometryScore score_odometry(const std::vector<PosePair>& pairs);
+
+}  // namespace arex::sim

@@ -1,0 +1,73 @@
+#include "scoring/odometry_error.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "math/random.h"
+
+namespace arex::sim {
+namespace {
+
+// A level figure of eight of about 60 m at constant heading along the path.
+std::vector<PosePair> figure_of_eight(const Pose& X_WO) {
+  std::vector<PosePair> pairs;
+  for (int i = 0; i <= 4000; ++i) {
+    const double s = 2 * std::numbers::pi * i / 4000;
+    PosePair pair;
+    pair.stamp = i * 5 * kNanosecondsPerTick;
+    pair.X_WB.p = {10 * std::sin(s), 5 * std::sin(2 * s), 1.5};
+    pair.X_WB.R = so3::from_yaw(std::atan2(10 * std::cos(2 * s), 10 * std::cos(s)));
+    pair.X_OB = X_WO.inverse() * pair.X_WB;
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+TEST(OdometryScore, APerfectEstimateScoresZeroInAnyFrame) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    RandomStream random(seed, "frame");
+    const Pose X_WO{so3::Exp(random.normal3()), 10 * random.normal3()};
+    const OdometryScore score = score_odometry(figure_of_eight(X_WO));
+    EXPECT_LT(score.ate_rmse_m, 1e-10);
+    EXPECT_LT(score.ate_se3_rmse_m, 1e-10);
+    EXPECT_LT(score.rpe_10m_m, 1e-10);
+    EXPECT_LT(score.yaw_error_max_deg, 1e-10);
+  }
+}
+
+// A constant offset of the estimate after the first pose is all start-aligned error, and none after
+// the rigid alignment.
+TEST(OdometryScore, SeparatesAlignmentAtStartFromTheRigidOne) {
+  auto pairs = figure_of_eight({});
+  for (std::size_t i = 1; i < pairs.size(); ++i) pairs[i].X_OB.p += Vec3(0.3, 0, 0.4);
+  const OdometryScore score = score_odometry(pairs);
+  EXPECT_NEAR(score.ate_rmse_m, 0.5, 1e-3);
+  EXPECT_NEAR(score.ate_max_m, 0.5, 1e-9);
+  EXPECT_LT(score.ate_se3_rmse_m, 0.01);
+}
+
+// A scale error of 1 % is 1 cm per metre and 10 cm per ten metres of straight path.
+TEST(OdometryScore, RelativeErrorMeasuresDriftPerPath) {
+  std::vector<PosePair> pairs;
+  for (int i = 0; i <= 3000; ++i) {
+    PosePair pair;
+    pair.X_WB.p = {0.01 * i, 0, 0};
+    pair.X_OB.p = {0.0101 * i, 0, 0};
+    pairs.push_back(pair);
+  }
+  const OdometryScore score = score_odometry(pairs);
+  EXPECT_NEAR(score.rpe_1m_m, 0.01, 2e-4);
+  EXPECT_NEAR(score.rpe_10m_m, 0.10, 2e-4);
+  EXPECT_NEAR(score.ate_max_m, 0.30, 1e-9);
+}
+
+TEST(OdometryScore, ReportsTheLargestHeadingError) {
+  auto pairs = figure_of_eight({});
+  pairs[1234].X_OB.R = pairs[1234].X_OB.R * so3::from_yaw(2 * std::numbers::pi / 180);
+  EXPECT_NEAR(score_odometry(pairs).yaw_error_max_deg, 2.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace arex::sim

@@ -27,6 +27,8 @@ add_library(arex_options INTERFACE)
 target_compile_options(arex_options INTERFACE
   -march=x86-64-v3 -ffp-contract=off -fpch-preprocess
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+  # GCC 12 sees phantom overruns and phantom uninitialised reads in Eigen's vectorised assignments.
+  -Wno-array-bounds -Wno-maybe-uninitialized
   $<$<BOOL:${AREX_WERROR}>:-Werror>
   $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)
 target_link_options(arex_options INTERFACE $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined>)

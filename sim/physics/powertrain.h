@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+
+#include "messages/commands.h"
+#include "physics/physics_config.h"
+
+namespace arex::sim {
+
+struct BatteryState {
+  double voltage_v = 0;        ///< at the terminals
+  double current_a = 0;        ///< out of the battery
+  double state_of_charge = 0;  ///< 1 full, 0 empty
+  double used_wh = 0;          ///< delivered at the terminals
+};
+
+/// Battery, speed controllers, motors and rotor speeds: throttle in, rotor speeds out.
+///
+/// Motor: u V = Kt w + R i, limited to +-i_max; J dw/dt = Kt (i - I0) - kQ w^2. The bus voltage
+/// V = E(q) - R_b I follows from all currents at once. Rotor speeds are integrated by RK4 with the
+/// bus voltage held over a tick.
+class Powertrain {
+ public:
+  Powertrain(const MotorConfig& motor, const RotorConfig& rotor, const BatteryConfig& battery);
+
+  /// Advances by one tick (1 ms).
+  void step(const MotorCommand& command);
+
+  [[nodiscard]] const BatteryState& battery() const { return state_; }
+  [[nodiscard]] const std::array<double, 4>& rotor_radps() const { return speed_; }
+  /// Over the last tick, rad/s^2.
+  [[nodiscard]] const std::array<double, 4>& rotor_acceleration() const { return acceleration_; }
+  [[nodiscard]] const std::array<double, 4>& motor_current_a() const { return current_; }
+  /// Open-circuit voltage of the battery at its present charge, V.
+  [[nodiscard]] double open_circuit_v() const;
+  /// The controllers have lost their supply and wait for zero throttle.
+  [[nodiscard]] bool browned_out() const { return browned_out_; }
+  /// Sets the rotors' speeds, rad/s (a start in the air, a test).
+  void set_rotor_radps(const std::array<double, 4>& speed) { speed_ = speed; }
+
+ private:
+  double limited_current(double throttle, double bus_v, double speed) const;
+  double bus_current(const std::array<double, 4>& throttle, double bus_v) const;
+  double solve_bus_voltage(const std::array<double, 4>& throttle) const;
+  double speed_after_tick(double throttle, double bus_v, double speed) const;
+
+  MotorConfig motor_;
+  RotorConfig rotor_;
+  BatteryConfig battery_;
+  BatteryState state_;
+  double charge_ = 1;  ///< may fall below 0 by the empty tail
+  bool browned_out_ = false;
+  std::array<double, 4> speed_{};
+  std::array<double, 4> acceleration_{};
+  std::array<double, 4> current_{};
+};
+
+}  // namespace arex::sim

@@ -36,24 +36,34 @@ JobQueue::Lane JobQueue::add_lane(std::string name) {
 }
 
 Stamp JobQueue::start(Lane lane, Stamp now, Stamp latency, Work work) {
-  auto job = std::make_shared<Job>();
-  job->lane = lane;
-  job->work = std::move(work);
   std::unique_lock lock(mutex_);
   LaneState& state = lanes_.at(lane);
-  job->visible_at = std::max(now, state.free_at) + latency;
-  state.free_at = job->visible_at;
+  const Stamp visible_at = std::max(now, state.free_at) + latency;
+  state.free_at = visible_at;
+  enqueue(lock, lane, visible_at, std::move(work));
+  return visible_at;
+}
+
+void JobQueue::schedule(Lane lane, Stamp visible_at, Work work) {
+  std::unique_lock lock(mutex_);
+  enqueue(lock, lane, visible_at, std::move(work));
+}
+
+void JobQueue::enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visible_at, Work work) {
+  auto job = std::make_shared<Job>();
+  job->visible_at = visible_at;
+  job->lane = lane;
+  job->work = std::move(work);
   const auto position = std::upper_bound(
       pending_.begin(), pending_.end(), job,
       [](const JobPtr& a, const JobPtr& b) { return a->visible_at < b->visible_at; });
   pending_.insert(position, job);
-  state.waiting.push_back(job);
+  lanes_.at(lane).waiting.push_back(job);
   if (workers_.empty()) {
     run_one(lock, lane);
   } else {
     work_available_.notify_one();
   }
-  return job->visible_at;
 }
 
 void JobQueue::advance(Stamp now) {

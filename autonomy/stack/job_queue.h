@@ -40,6 +40,10 @@ class JobQueue {
   /// visible.
   Stamp start(Lane lane, Stamp now, Stamp latency, Work work);
 
+  /// Schedules device work that becomes visible at a stamp of the caller's: a sensor that is read
+  /// out while it exposes the next frame. It does not occupy the lane in simulated time.
+  void schedule(Lane lane, Stamp visible_at, Work work);
+
   /// Delivers every result that is visible at `now`, in order of visibility, then of start.
   /// Rethrows what a job threw.
   void advance(Stamp now);
@@ -73,6 +77,7 @@ class JobQueue {
     std::vector<float> seconds;
   };
 
+  void enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visible_at, Work work);
   static void execute(Job& job);
   bool run_one(std::unique_lock<std::mutex>& lock, Lane lane);
   void run_worker();

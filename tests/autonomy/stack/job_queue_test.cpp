@@ -87,6 +87,23 @@ TEST(JobQueue, DeliveriesAreTheSameForAnyNumberOfThreads) {
   }
 }
 
+TEST(JobQueue, ScheduledDeviceWorkKeepsTheCallersTime) {
+  for (const int threads : {1, 3}) {
+    JobQueue jobs(threads);
+    const auto lane = jobs.add_lane("lidar");
+    std::vector<int> seen;
+    for (int part = 0; part < 5; ++part) {
+      jobs.schedule(lane, 100 * kMs,
+                    [&seen, part] { return [&seen, part] { seen.push_back(part); }; });
+    }
+    EXPECT_TRUE(jobs.is_free(lane, 0));
+    jobs.advance(99 * kMs);
+    EXPECT_TRUE(seen.empty());
+    jobs.advance(100 * kMs);
+    EXPECT_EQ(seen, (std::vector<int>{0, 1, 2, 3, 4}));
+  }
+}
+
 TEST(JobQueue, RethrowsWhatAJobThrew) {
   for (const int threads : {1, 3}) {
     JobQueue jobs(threads);

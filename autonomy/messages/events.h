@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "math/types.h"
+
+namespace arex {
+
+/// What can happen on a mission, as events.csv names it.
+enum class EventKind : std::uint8_t {
+  kMissionState,  ///< the mission entered the state named in the detail
+  kArmed,
+  kDisarmed,
+  kTargetSelected,  ///< a new goal or waypoint, detail: x y z in O
+  kTargetReached,   ///< detail: x y z in O, distance
+  kTargetDropped,   ///< detail: why
+  kOdometryStatus,  ///< detail: the new status
+  kPlanner,         ///< detail: state or result of the planner
+  kStuck,           ///< detail: the typed cause
+  kRecovery,        ///< detail: what is tried
+  kBattery,         ///< detail: the decision taken
+  kSensorFault,     ///< an injected or detected fault
+  kCollision,       ///< detail: class and object hit, speed
+  kFinished,        ///< detail: outcome and reason
+};
+inline constexpr std::array<std::string_view, 14> kEventKindNames{
+    "mission_state",  "armed",           "disarmed",  "target_selected", "target_reached",
+    "target_dropped", "odometry_status", "planner",   "stuck",           "recovery",
+    "battery",        "sensor_fault",    "collision", "finished"};
+
+struct Event {
+  Stamp stamp = 0;
+  EventKind kind = EventKind::kMissionState;
+  std::string detail;
+};
+
+}  // namespace arex

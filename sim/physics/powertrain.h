@@ -39,10 +39,15 @@ class Powertrain {
   void set_rotor_radps(const std::array<double, 4>& speed) { speed_ = speed; }
 
  private:
-  double limited_current(double throttle, double bus_v, double speed) const;
-  double bus_current(const std::array<double, 4>& throttle, double bus_v) const;
-  double solve_bus_voltage(const std::array<double, 4>& throttle) const;
-  double speed_after_tick(double throttle, double bus_v, double speed) const;
+  /// What the bus has to deliver at one voltage, and how that changes with it (A, A/V).
+  struct Load {
+    double current_a = 0;
+    double slope = 0;
+  };
+  [[nodiscard]] double motor_current(double throttle, double bus_v, double speed) const;
+  [[nodiscard]] Load load(const std::array<double, 4>& throttle, double bus_v) const;
+  [[nodiscard]] double solve_bus_voltage(const std::array<double, 4>& throttle) const;
+  [[nodiscard]] double speed_after_tick(double throttle, double bus_v, double speed) const;
 
   MotorConfig motor_;
   RotorConfig rotor_;

@@ -1,0 +1,183 @@
+#include "worlds/forest.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "worlds/reflectivity.h"
+#include "worlds/sampling.h"
+#include "worlds/undergrowth.h"
+
+namespace arex::worlds {
+namespace {
+
+/// Below this height clearings and corridors are free of branches too, m above the ground.
+constexpr double kClearHeight = 4.0;
+
+double distance_to_segment(const Vec2& p, const Vec2& a, const Vec2& b) {
+  const Vec2 d = b - a;
+  const double length2 = d.squaredNorm();
+  const double t = length2 > 0 ? std::clamp((p - a).dot(d) / length2, 0.0, 1.0) : 0.0;
+  return (p - a - t * d).norm();
+}
+
+/// Whether p, widened by `margin`, touches a clearing or a corridor.
+bool is_cleared(const ForestRecipe& recipe, const Vec2& p, double margin) {
+  for (const Clearing& clearing : recipe.clearings) {
+    if ((p - clearing.centre_m).norm() < clearing.radius_m + margin) return true;
+  }
+  for (const Corridor& corridor : recipe.corridors) {
+    for (std::size_t i = 0; i + 1 < corridor.points_m.size(); ++i) {
+      if (distance_to_segment(p, corridor.points_m[i], corridor.points_m[i + 1]) <
+          corridor.width_m / 2 + margin) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// A sum of plane waves with random directions and phases: stationary, isotropic, of RMS
+/// amplitude / sqrt 2.
+class Swell {
+ public:
+  Swell(RandomStream random, double amplitude, double shortest, double longest) {
+    double power = 0;
+    for (Wave& wave : waves_) {
+      const double length = shortest * std::pow(longest / shortest, random.uniform());
+      const double heading = random.uniform(0, 2 * std::numbers::pi);
+      wave.k = 2 * std::numbers::pi / length * direction(heading, 0).head<2>();
+      wave.phase = random.uniform(0, 2 * std::numbers::pi);
+      wave.amplitude = length;  // equal steepness
+      power += length * length;
+    }
+    for (Wave& wave : waves_) wave.amplitude *= amplitude / std::sqrt(power);
+  }
+  [[nodiscard]] double at(const Vec2& p) const {
+    double height = 0;
+    for (const Wave& wave : waves_) height += wave.amplitude * std::cos(wave.k.dot(p) + wave.phase);
+    return height;
+  }
+
+ private:
+  struct Wave {
+    Vec2 k = Vec2::Zero();
+    double phase = 0;
+    double amplitude = 0;
+  };
+  std::array<Wave, 24> waves_;
+};
+
+HeightField make_terrain(const ForestRecipe& recipe, const RandomStream& random) {
+  const Swell swell(random.fork(0), recipe.relief_m, 0.6 * recipe.relief_wavelength_m,
+                    1.8 * recipe.relief_wavelength_m);
+  const Swell bumps(random.fork(1), recipe.roughness_m, 1.0, 3.0);
+  HeightField field;
+  // The nearest number of cells, at least the asked-for size.
+  field.spacing_m = recipe.ground_spacing_m;
+  field.columns = static_cast<int>(std::ceil(recipe.size_m.x() / field.spacing_m - 1e-9)) + 1;
+  field.rows = static_cast<int>(std::ceil(recipe.size_m.y() / field.spacing_m - 1e-9)) + 1;
+  field.origin =
+      -0.5 * field.spacing_m * Vec2(static_cast<double>(field.columns - 1), field.rows - 1);
+  const double start_height = swell.at(Vec2::Zero());
+  for (int row = 0; row < field.rows; ++row) {
+    for (int column = 0; column < field.columns; ++column) {
+      const Vec2 p = field.origin + field.spacing_m * Vec2(static_cast<double>(column), row);
+      // Level at the start, as the swell wants from three radii on.
+      const double t = std::clamp((p.norm() / recipe.start_radius_m - 1) / 2, 0.0, 1.0);
+      const double blend = t * t * (3 - 2 * t);
+      const double height = swell.at(p) + bumps.at(p) - start_height;
+      field.height_m.push_back(static_cast<float>(blend * height));
+    }
+  }
+  return field;
+}
+
+/// A point of the ground for undergrowth: away from the start and from what is cleared.
+bool free_for_undergrowth(const ForestRecipe& recipe, const Vec2& p, double reach) {
+  return p.norm() > recipe.start_radius_m + reach && !is_cleared(recipe, p, reach);
+}
+
+void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const HeightField& terrain,
+                     std::uint64_t seed) {
+  const UndergrowthRecipe& plants = recipe.undergrowth;
+  const Vec2 extent = recipe.size_m - 2 * Vec2::Constant(recipe.edge_m);
+  const auto ground = [&](const Vec2& p) { return Vec3(p.x(), p.y(), terrain.at(p.x(), p.y())); };
+  const auto scatter = [&](std::string_view name, double density, const auto& place) {
+    RandomStream stream(seed, name);
+    const auto count = static_cast<int>(std::lround(density * extent.prod()));
+    for (int i = 0; i < count; ++i) {
+      const Vec2 p = extent.cwiseProduct(Vec2(stream.uniform() - 0.5, stream.uniform() - 0.5));
+      place(p, stream.fork(static_cast<std::uint64_t>(i)));
+    }
+  };
+  scatter("worlds/forest/shrubs", plants.shrub_density_per_m2, [&](const Vec2& p, RandomStream r) {
+    const double scale = truncated_normal(r, 1, 0.3, 0.4, 1.8);
+    const double height = plants.shrub_height_m * scale;
+    if (!free_for_undergrowth(recipe, p, height)) return;
+    const auto leaves = static_cast<int>(std::lround(plants.shrub_leaves * scale * scale));
+    add_shrub(builder, ground(p), height, leaves, r);
+  });
+  scatter("worlds/forest/ferns", plants.fern_density_per_m2, [&](const Vec2& p, RandomStream r) {
+    const double length = plants.fern_length_m * r.uniform(0.6, 1.3);
+    if (free_for_undergrowth(recipe, p, length)) add_fern(builder, ground(p), length, r);
+  });
+  scatter("worlds/forest/logs", plants.log_density_per_m2, [&](const Vec2& p, RandomStream r) {
+    const double length = plants.log_length_m * r.uniform(0.5, 1.5);
+    const double radius = plants.log_radius_m * r.uniform(0.6, 1.4);
+    const double heading = r.uniform(0, 2 * std::numbers::pi);
+    const Vec2 along = 0.5 * length * direction(heading, 0).head<2>();
+    const bool inside =
+        ((p.cwiseAbs() + along.cwiseAbs()).array() < 0.5 * recipe.size_m.array()).all();
+    if (inside && free_for_undergrowth(recipe, p - along, radius) &&
+        free_for_undergrowth(recipe, p, 0.5 * length)) {
+      add_log(builder, terrain, p, heading, length, radius, r);
+    }
+  });
+}
+
+}  // namespace
+
+std::vector<Vec2> place_trees(const ForestRecipe& recipe, std::uint64_t seed) {
+  const Vec2 corner = 0.5 * recipe.size_m - Vec2::Constant(recipe.edge_m);
+  std::vector<Vec2> trees =
+      scatter_discs(-corner, corner, recipe.tree_density_per_m2, recipe.min_spacing_m,
+                    RandomStream(seed, "worlds/forest/trees"));
+  // Clearing comes after placing, so that the rest of the forest stays as it was.
+  const double reach = recipe.tree.trunk_radius_max_m * (1 + recipe.tree.root_flare);
+  std::erase_if(trees, [&](const Vec2& p) {
+    return p.norm() < recipe.start_radius_m + reach || is_cleared(recipe, p, reach);
+  });
+  return trees;
+}
+
+World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
+  MeshBuilder builder;
+  RandomStream ground_stream(seed, "worlds/forest/ground");
+  const HeightField terrain = make_terrain(recipe, ground_stream.fork(0));
+  builder.add_height_field(
+      builder.add_object(SurfaceClass::kGround, kForestFloorReflectivity.draw(ground_stream)),
+      terrain);
+
+  const Allowed allowed = [&](const Vec3& p) {
+    const Vec2 xy = p.head<2>();
+    if (xy.norm() < recipe.start_radius_m) return false;
+    return p.z() - terrain.at(p.x(), p.y()) > kClearHeight || !is_cleared(recipe, xy, 0);
+  };
+  const RandomStream tree_stream(seed, "worlds/forest/tree");
+  std::uint64_t index = 0;
+  for (const Vec2& p : place_trees(recipe, seed)) {
+    add_tree(builder, recipe.tree, {p.x(), p.y(), terrain.at(p.x(), p.y())}, allowed,
+             tree_stream.fork(index++));
+  }
+  add_undergrowth(builder, recipe, terrain, seed);
+
+  World world = builder.finish();
+  world.bounds.low.head<2>() = terrain.origin;
+  world.bounds.high.head<2>() = -terrain.origin;
+  world.X_WS.p = Vec3(0, 0, terrain.at(0, 0));
+  return world;
+}
+
+}  // namespace arex::worlds

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "worlds/mesh_builder.h"
+#include "worlds/tree.h"
+
+namespace arex::worlds {
+
+/// A shrub of about this height: stems, each with a collision capsule, and leaves around them.
+void add_shrub(MeshBuilder& builder, const Vec3& root, double height, int leaves,
+               RandomStream random);
+
+/// A fern: arching fronds of about this length, without collision shapes.
+void add_fern(MeshBuilder& builder, const Vec3& root, double length, RandomStream random);
+
+/// A fallen log along `heading` (rad) that rests on the terrain under its ends; stubs of branches.
+void add_log(MeshBuilder& builder, const HeightField& terrain, const Vec2& middle, double heading,
+             double length, double radius, RandomStream random);
+
+}  // namespace arex::worlds

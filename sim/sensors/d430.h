@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "math/pose.h"
+#include "math/random.h"
+#include "messages/sensors.h"
+#include "sensors/d430_stereo.h"
+#include "sensors/renderer.h"
+#include "worlds/world.h"
+
+namespace arex::sim {
+
+/// The depth camera in a world. Frames W, B and C: z forward, x right, y down, the left imager's.
+///
+/// A frame is a pure function of (config, world, X_BC, seed, stamp, pose): it may be rendered only
+/// when somebody reads it, on any thread, in any order. One frame at a time per device.
+class D430 {
+ public:
+  /// The world is copied to the graphics device; it need not outlive this.
+  /// @throws std::runtime_error if there is no headless OpenGL 4.5.
+  D430(const D430Config& config, const worlds::World& world, const Pose& X_BC, std::uint64_t seed);
+
+  /// The frame taken at `stamp` with the body at X_WB.
+  [[nodiscard]] DepthImagePtr capture(Stamp stamp, const Pose& X_WB);
+
+  /// Stands in the run's summary: a GPU's depth differs from llvmpipe's in the last bits.
+  [[nodiscard]] const std::string& renderer_name() const { return renderer_.renderer_name(); }
+  [[nodiscard]] Renderer::Statistics last_frame() const { return renderer_.last_frame(); }
+
+ private:
+  D430Config config_;
+  Pose X_BC_;
+  RandomStream random_;
+  Renderer renderer_;
+  StereoModel stereo_;
+  std::vector<float> inverse_depth_;
+};
+
+}  // namespace arex::sim

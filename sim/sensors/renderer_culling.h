@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "math/pose.h"
+#include "messages/sensors.h"
+#include "worlds/world.h"
+
+namespace arex::sim {
+
+/// The part of space a camera can see: the pyramid through the outer borders of its border pixels,
+/// cut at a greatest depth.
+class ViewVolume {
+ public:
+  ViewVolume(const PinholeCamera& camera, const Pose& X_WC, double far_m);
+
+  /// False only if no point of the box (in W) lies inside. May err on the side of true.
+  [[nodiscard]] bool touches(const Eigen::AlignedBox3f& box) const;
+  /// Smallest depth (z in C) of any point of the box, m; negative behind the camera.
+  [[nodiscard]] double nearest_depth(const Eigen::AlignedBox3f& box) const;
+
+ private:
+  struct Plane {
+    Vec3 normal;  ///< in W, points inwards
+    double offset = 0;
+  };
+  std::vector<Plane> planes_;  ///< left, right, top, bottom, back, far
+};
+
+/// A mesh cut finer than its chunks, for culling: a view touches the clusters it needs and few
+/// more.
+struct ClusteredMesh {
+  std::vector<Vec3f> vertices;                          ///< in W, in the order of their first use
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< the mesh's own, grouped by cluster
+  std::vector<std::uint32_t> source;                    ///< of each triangle: its index in the mesh
+  std::vector<worlds::Chunk> clusters;                  ///< cover all triangles once, in order
+};
+
+/// Each chunk's triangles along a Morton curve, cut into runs of at most `max_triangles`.
+ClusteredMesh cluster_mesh(const worlds::Mesh& mesh, std::uint32_t max_triangles);
+
+/// Indices of the chunks or clusters that may be seen, nearest first (ties by index).
+std::vector<std::uint32_t> visible_chunks(const std::vector<worlds::Chunk>& chunks,
+                                          const ViewVolume& view);
+
+}  // namespace arex::sim

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "math/types.h"
+
+namespace arex {
+
+/// The 2D occupancy map of the exploration in O: -1 unknown, 0 free, 1 occupied (paper,
+/// Environmental Modelling). Row-major, x fastest: cells[iy * width + ix].
+struct OccupancyMap2D {
+  static constexpr std::int8_t kUnknown = -1;
+  static constexpr std::int8_t kFree = 0;
+  static constexpr std::int8_t kOccupied = 1;
+
+  Vec2 origin = Vec2::Zero();  ///< lower corner of cell (0, 0), m
+  double resolution = 0.1;     ///< m per cell
+  int width = 0;               ///< cells along x
+  int height = 0;              ///< cells along y
+  std::vector<std::int8_t> cells;
+
+  [[nodiscard]] Eigen::Vector2i cell_of(const Vec2& p) const {
+    return ((p - origin) / resolution).array().floor().cast<int>();
+  }
+  [[nodiscard]] Vec2 centre_of(const Eigen::Vector2i& cell) const {
+    return origin + resolution * (cell.cast<double>().array() + 0.5).matrix();
+  }
+  [[nodiscard]] bool contains(const Eigen::Vector2i& cell) const {
+    return cell.x() >= 0 && cell.y() >= 0 && cell.x() < width && cell.y() < height;
+  }
+  [[nodiscard]] std::size_t index(const Eigen::Vector2i& cell) const {
+    return static_cast<std::size_t>(cell.y()) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(cell.x());
+  }
+  /// State of a cell; outside the map unknown.
+  [[nodiscard]] std::int8_t at(const Eigen::Vector2i& cell) const {
+    return contains(cell) ? cells[index(cell)] : kUnknown;
+  }
+};
+
+}  // namespace arex

@@ -1,0 +1,100 @@
+#pragma once
+
+#include "planning/anchors.h"
+#include "planning/lbfgs_minimiser.h"
+#include "planning/path_timing.h"
+
+namespace arex {
+
+/// Parameters of the local planner. Defaults from EGO-Planner (reference.md, section 6) unless
+/// noted.
+struct LocalPlannerConfig {
+  double max_speed_mps = 2.0;
+  double max_acceleration_mps2 = 3.0;
+  double max_jerk_mps3 = 4.0;
+  double limit_tolerance = 0.04;  ///< on norms; the requirement is 5 %
+  double control_point_distance_m = 0.4;
+  double knot_span_ratio = 1.2;       ///< knot span = ratio * distance / speed
+  double initial_speed_share = 0.85;  ///< leaves room for detours; tests/bench/planning
+
+  double weight_smoothness = 1.0;   ///< lambda_s dt^-6: the published weight is per knot span
+  double weight_collision = 0.5;    ///< lambda_c
+  double weight_feasibility = 0.1;  ///< lambda_d
+  double weight_fitness = 1.0;
+  double safe_distance_m = 0.5;         ///< s_f
+  double feasibility_threshold = 0.95;  ///< lambda of f
+  double feasibility_junction = 1.5;    ///< c_j / c_m of f
+  double weight_speed = 1.0;            ///< w_v
+  double weight_acceleration = 1.0;     ///< w_a
+  double weight_jerk = 0.001;           ///< w_j
+  double fitness_along_m2 = 25.0;       ///< a^2
+  double fitness_across_m2 = 1.0;       ///< b^2
+
+  LbfgsConfig rebound{16, 80, 0.01};
+  LbfgsConfig refine{16, 80, 0.001};
+  int max_rebounds = 6;
+  int random_starts = 2;
+  double random_amplitude = 0.3;  ///< of the distance
+  SearchConfig search;
+
+  double timing_knot_span_s = 0.05;  ///< of path-following splines
+  double timing_jerk_mps3 = 30.0;    ///< build-up of acceleration along a path
+  int timing_attempts = 5;
+
+  double true_radius_m = 0.3;  ///< the vehicle's (models/arex/README.md)
+  double max_goal_shift_m = 1.5;
+  double escape_distance_m = 1.5;
+  double escape_speed_mps = 0.5;
+  bool stop_in_known_space = true;
+  double reaction_s = 0.1;  ///< between seeing and braking: one LiDAR frame
+
+  [[nodiscard]] MotionLimits limits() const {
+    return {max_speed_mps, max_acceleration_mps2, timing_jerk_mps3};
+  }
+
+  void fields(auto& f) {
+    f("max_speed_mps", max_speed_mps, "limit of the speed's norm");
+    f("max_acceleration_mps2", max_acceleration_mps2, "limit of the acceleration's norm");
+    f("max_jerk_mps3", max_jerk_mps3, "jerk limit of the feasibility term");
+    f("limit_tolerance", limit_tolerance, "share by which norms may exceed their limits");
+    f("control_point_distance_m", control_point_distance_m, "between control points");
+    f("knot_span_ratio", knot_span_ratio, "knot span = ratio * control point distance / speed");
+    f("initial_speed_share", initial_speed_share, "of the speed limit for the initial path");
+    f("weight_smoothness", weight_smoothness, "lambda_s in units of the knot span (paper)");
+    f("weight_collision", weight_collision, "lambda_c (paper)");
+    f("weight_feasibility", weight_feasibility, "lambda_d (paper)");
+    f("weight_fitness", weight_fitness, "of keeping the shape in the refinement");
+    f("safe_distance_m", safe_distance_m, "s_f, beyond the inflation (paper)");
+    f("feasibility_threshold", feasibility_threshold, "lambda of f (paper)");
+    f("feasibility_junction", feasibility_junction, "c_j over c_m of f (paper)");
+    f("weight_speed", weight_speed, "w_v (paper)");
+    f("weight_acceleration", weight_acceleration, "w_a (paper)");
+    f("weight_jerk", weight_jerk, "w_j (paper)");
+    f("fitness_along_m2", fitness_along_m2, "a^2 of the refinement");
+    f("fitness_across_m2", fitness_across_m2, "b^2 of the refinement");
+    f("rebound", rebound, "minimisation of the rebound stage");
+    f("refine", refine, "minimisation of the refine stage");
+    f("max_rebounds", max_rebounds, "minimisations before an initial path is given up");
+    f("random_starts", random_starts, "random polynomials tried");
+    f("random_amplitude", random_amplitude, "sideways reach of those, share of the distance");
+    f("search", search, "A* budgets");
+    f("timing_knot_span_s", timing_knot_span_s, "of path-following splines");
+    f("timing_jerk_mps3", timing_jerk_mps3, "build-up of acceleration along a path");
+    f("timing_attempts", timing_attempts, "tries to time a path, each slower");
+    f("true_radius_m", true_radius_m, "of the vehicle: inflation shrinks to it for an escape");
+    f("max_goal_shift_m", max_goal_shift_m, "of a goal inside the inflation");
+    f("escape_distance_m", escape_distance_m, "furthest way out of the inflation");
+    f("escape_speed_mps", escape_speed_mps, "speed of an escape");
+    f("stop_in_known_space", stop_in_known_space, "slow down before unknown cells");
+    f("reaction_s", reaction_s, "between seeing and braking");
+    f.check(max_speed_mps > 0, "max_speed_mps > 0");
+    f.check(max_acceleration_mps2 > 0, "max_acceleration_mps2 > 0");
+    f.check(control_point_distance_m > 0, "control_point_distance_m > 0");
+    f.check(safe_distance_m > 0, "safe_distance_m > 0");
+    f.check(feasibility_threshold < feasibility_junction,
+            "feasibility_threshold < feasibility_junction");
+    f.check(timing_knot_span_s > 0, "timing_knot_span_s > 0");
+  }
+};
+
+}  // namespace arex

@@ -1,0 +1,179 @@
+/// Random pillar fields of reference.md, section 10: success, limits and time of the local planner.
+///
+///     planner_bench [cases per setting] [seed] [verbose]
+///
+/// A case counts as solved when the planner says ok and the trajectory, checked every 1 ms to its
+/// very end, touches no inflated cell; the denominator is the cases that a complete 3D A* (26-
+/// connected, corners may be cut, no budget) solves. Times are single-thread CPU time of plan().
+/// Cruise cases start at 1.5 m/s towards the goal; those whose straight braking distance at the
+/// acceleration limit (0.375 m) is not free cannot come out of a flight that can always stop, and
+/// are counted apart.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "planning/local_planner.h"
+#include "support/pillar_field.h"
+
+namespace {
+
+using namespace arex;
+
+constexpr double kDistance_m = 7.5;
+constexpr double kCruise_mps = 1.5;
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+struct Tally {
+  int solvable = 0, solved = 0, doomed = 0, doomed_solved = 0, touched = 0;
+  double max_speed = 0, max_acceleration = 0, worst_boundary = 0, slowness = 0;
+  std::vector<double> ms;
+  std::map<std::string_view, int> stages, failures;
+};
+
+bool touches(const GridView& grid, const UniformBspline& spline, Tally& tally) {
+  bool touched = false;
+  const int steps = static_cast<int>(spline.duration_s() / 1e-3) + 1;
+  for (int k = 0; k <= steps; ++k) {
+    const MotionState state = spline.state(1e-3 * k);
+    touched |= grid.inflated(state.p) || !grid.contains(grid.cell_of(state.p));
+    tally.max_speed = std::max(tally.max_speed, state.v.norm());
+    tally.max_acceleration = std::max(tally.max_acceleration, state.a.norm());
+  }
+  return touched;
+}
+
+bool can_brake_straight(const GridView& grid, const support::PillarCase& drawn,
+                        double max_acceleration) {
+  const Vec3 ahead = (drawn.goal - drawn.start).normalized();
+  const double length = kCruise_mps * kCruise_mps / (2 * max_acceleration);
+  for (double s = 0; s <= length; s += 0.005) {
+    if (grid.inflated(drawn.start + s * ahead)) return false;
+  }
+  return true;
+}
+
+void dump(const support::PillarField& field, const UniformBspline& spline, const char* name) {
+  if (std::FILE* file = std::fopen(name, "w")) {
+    const GridView grid = field.view();
+    std::fprintf(file, "%d %d %g\n", grid.size.x(), grid.size.y(), grid.resolution_m);
+    for (int x = 0; x < grid.size.x(); ++x) {
+      for (int y = 0; y < grid.size.y(); ++y) {
+        std::fputc('0' + (grid.cells[grid.index({x, y, 15})] & 3), file);
+      }
+      std::fputc('\n', file);
+    }
+    for (double t = 0; t < spline.duration_s(); t += 0.01) {
+      const Vec3 p = spline.position(t);
+      std::fprintf(file, "%g %g %g\n", p.x(), p.y(), p.z());
+    }
+    std::fclose(file);
+  }
+}
+
+void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t seed, bool verbose) {
+  LocalPlannerConfig config;
+  LocalPlanner planner(config);
+  GridAstar oracle;
+  Tally tally;
+  support::PillarFieldOptions options;
+  options.pillars = pillars;
+  options.inflation_m = inflation;
+  for (int i = 0; i < cases; ++i) {
+    const auto index = static_cast<std::uint64_t>(i);
+    const support::PillarField field(options, seed, index);
+    const GridView grid = field.view();
+    const auto drawn =
+        support::draw_case(grid, RandomStream(seed, "pillar_case").fork(index), kDistance_m);
+    if (!drawn.valid) continue;
+    const auto way = oracle.search(grid, grid.cell_of(drawn.start), grid.cell_of(drawn.goal),
+                                   {1 << 30, -1, -1, true, false});
+    if (way.status != AstarStatus::kFound) continue;
+    PlanRequest request;
+    request.start.p = drawn.start;
+    request.goal = drawn.goal;
+    request.seed = seed + index;
+    bool doomed = false;
+    if (cruise) {
+      request.start.v = kCruise_mps * (drawn.goal - drawn.start).normalized();
+      doomed = !can_brake_straight(grid, drawn, config.max_acceleration_mps2);
+    }
+    const double begin = cpu_seconds();
+    const PlanResult result = planner.plan(grid, request);
+    const double ms = 1e3 * (cpu_seconds() - begin);
+    tally.ms.push_back(ms);
+    const bool touched = result.ok() && touches(grid, result.trajectory, tally);
+    const bool solved = result.ok() && !touched;
+    tally.touched += touched;
+    if (result.ok()) {
+      tally.worst_boundary =
+          std::max({tally.worst_boundary, (result.trajectory.position(0) - request.start.p).norm(),
+                    (result.trajectory.velocity(0) - request.start.v).norm(),
+                    (result.trajectory.position(1e9) - request.goal).norm()});
+      tally.slowness += result.trajectory.duration_s();
+    }
+    (doomed ? tally.doomed : tally.solvable) += 1;
+    (doomed ? tally.doomed_solved : tally.solved) += solved;
+    ++tally.stages[to_string(result.diagnostics.stage)];
+    if (!solved && !doomed) ++tally.failures[touched ? "touched" : to_string(result.status)];
+    if (verbose && ((!solved && !doomed) || ms > 8)) {
+      const PlanDiagnostics& d = result.diagnostics;
+      std::printf(
+          "  case %d: %s stage %s %.2f ms attempts %d rebounds %d it %d ev %d astar %d/%d\n", i,
+          std::string(to_string(result.status)).c_str(), std::string(to_string(d.stage)).c_str(),
+          ms, d.attempts, d.rebounds, d.iterations, d.evaluations, d.astar_searches,
+          d.astar_expansions);
+      if (!solved) {
+        dump(field,
+             result.ok() ? result.trajectory
+                         : UniformBspline({drawn.start, drawn.start, drawn.start, drawn.goal,
+                                           drawn.goal, drawn.goal},
+                                          1.0),
+             ("/tmp/planner_case_" + std::to_string(pillars) + (cruise ? "c" : "r") + "_" +
+              std::to_string(i) + ".txt")
+                 .c_str());
+      }
+    }
+  }
+  std::sort(tally.ms.begin(), tally.ms.end());
+  const auto at = [&](double q) {
+    return tally.ms[static_cast<std::size_t>(q * static_cast<double>(tally.ms.size() - 1))];
+  };
+  std::printf(
+      "%3d pillars, %.1f m, %-6s: %d/%d = %.2f %%  median %.2f p90 %.2f p99 %.2f max %.2f ms"
+      "  |v| %.3f |a| %.3f  boundary %.0e  mean %.2f s",
+      pillars, inflation, cruise ? "cruise" : "rest", tally.solved, tally.solvable,
+      100.0 * tally.solved / std::max(1, tally.solvable), at(0.5), at(0.9), at(0.99), at(1),
+      tally.max_speed, tally.max_acceleration, tally.worst_boundary,
+      tally.slowness / std::max<double>(1, static_cast<double>(tally.ms.size())));
+  if (cruise) std::printf("  (cannot brake: %d/%d)", tally.doomed_solved, tally.doomed);
+  std::printf("\n     stages:");
+  for (const auto& [name, count] : tally.stages)
+    std::printf(" %s %d", std::string(name).c_str(), count);
+  for (const auto& [name, count] : tally.failures)
+    std::printf(" !%s %d", std::string(name).c_str(), count);
+  std::printf("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int cases = argc > 1 ? std::atoi(argv[1]) : 500;
+  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
+  const bool verbose = argc > 3;
+  for (const bool cruise : {false, true}) {
+    for (const int pillars : {90, 180}) {
+      for (const double inflation : {0.3, 0.5})
+        run(pillars, inflation, cruise, cases, seed, verbose);
+    }
+  }
+}

@@ -15,7 +15,7 @@ struct VehicleConfig {
                       0.0};            ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
   double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
   double torque_ratio_m = 0.0143;      ///< rotor drag torque per thrust
-  double radius_m = 0.30;  ///< of the sphere about B that holds the airframe, propellers included
+  double radius_m = 0.305;  ///< of the sphere about B that holds the airframe, propellers included
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
   double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)

@@ -1,0 +1,23 @@
+#include <png.h>
+
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "sensors/picture.h"
+
+namespace arex::sim {
+
+void save_png(const Picture& picture, const std::filesystem::path& file) {
+  png_image image;
+  std::memset(&image, 0, sizeof(image));
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(picture.width);
+  image.height = static_cast<png_uint_32>(picture.height);
+  image.format = PNG_FORMAT_RGB;
+  if (png_image_write_to_file(&image, file.c_str(), 0, picture.rgb.data(), 0, nullptr) == 0) {
+    throw std::runtime_error(file.string() + ": " + image.message);
+  }
+}
+
+}  // namespace arex::sim

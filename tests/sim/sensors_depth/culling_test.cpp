@@ -1,0 +1,83 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "depth_scenes.h"
+#include "sensors/d430_stereo.h"
+#include "sensors/renderer_culling.h"
+
+namespace arex::sim {
+namespace {
+
+bool pixel_sees(const PinholeCamera& camera, const Pose& X_CW, const Vec3& p_W, double far_m) {
+  const Vec3 p = X_CW * p_W;
+  if (p.z() <= 0 || p.z() > far_m) return false;
+  const double u = camera.cx + camera.fx * p.x() / p.z(), v = camera.cy + camera.fy * p.y() / p.z();
+  return u >= -0.5 && u <= camera.width - 0.5 && v >= -0.5 && v <= camera.height - 0.5;
+}
+
+TEST(ViewVolume, TouchesEveryBoxThatHoldsAPointInView) {
+  const PinholeCamera camera = D430Config{}.camera();
+  RandomStream random(1, "boxes");
+  int inside = 0, rejected = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Pose X_WC{so3::Exp(3 * random.normal3()), 5 * random.normal3()};
+    const ViewVolume view(camera, X_WC, 12);
+    const Vec3 low = 8 * random.normal3();
+    const Eigen::AlignedBox3f box(
+        low.cast<float>(),
+        (low + Vec3(random.uniform(), random.uniform(), random.uniform()) * 4).cast<float>());
+    bool seen = false;
+    for (int k = 0; k < 50; ++k) {
+      const Vec3 t(random.uniform(), random.uniform(), random.uniform());
+      const Vec3 p = box.min().cast<double>() + t.cwiseProduct(box.sizes().cast<double>());
+      seen = seen || pixel_sees(camera, X_WC.inverse(), p, 12);
+    }
+    inside += seen ? 1 : 0;
+    rejected += view.touches(box) ? 0 : 1;
+    if (seen) {
+      EXPECT_TRUE(view.touches(box));
+    }
+  }
+  EXPECT_GT(inside, 300);     // the loop has tested something,
+  EXPECT_GT(rejected, 2500);  // and culling culls
+}
+
+TEST(ClusterMesh, KeepsEveryTriangleOnceWithinItsClustersBounds) {
+  const worlds::World world = small_forest(3);
+  const ClusteredMesh clustered = cluster_mesh(world.mesh, 64);
+  ASSERT_EQ(clustered.triangles.size(), world.mesh.triangles.size());
+  const std::set<std::uint32_t> sources(clustered.source.begin(), clustered.source.end());
+  EXPECT_EQ(sources.size(), world.mesh.triangles.size());
+  std::uint32_t next = 0;
+  for (const worlds::Chunk& cluster : clustered.clusters) {
+    EXPECT_EQ(cluster.first_triangle, next);
+    EXPECT_LE(cluster.triangle_count, 64U);
+    next += cluster.triangle_count;
+    for (std::uint32_t t = cluster.first_triangle; t < next; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3f& p = clustered.vertices[clustered.triangles[t][k]];
+        EXPECT_TRUE(cluster.bounds.contains(p));
+        EXPECT_EQ(p, world.mesh.vertices[world.mesh.triangles[clustered.source[t]][k]]);
+      }
+    }
+  }
+  EXPECT_EQ(next, world.mesh.triangles.size());
+}
+
+TEST(VisibleChunks, ComeNearestFirst) {
+  const worlds::World world = small_forest(4);
+  const Pose X_WC = Pose{Mat3::Identity(), Vec3(0, 0, 2)} * forward_camera();
+  const ViewVolume view(D430Config{}.camera(), X_WC, 12);
+  const auto visible = visible_chunks(world.mesh.chunks, view);
+  ASSERT_GT(visible.size(), 3U);
+  EXPECT_LT(visible.size(), world.mesh.chunks.size());
+  EXPECT_TRUE(std::is_sorted(visible.begin(), visible.end(), [&](auto a, auto b) {
+    return view.nearest_depth(world.mesh.chunks[a].bounds) <
+           view.nearest_depth(world.mesh.chunks[b].bounds);
+  }));
+}
+
+}  // namespace
+}  // namespace arex::sim

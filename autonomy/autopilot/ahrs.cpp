@@ -14,6 +14,8 @@ constexpr int kTheta = 0, kBias = 3, kVelocity = 6, kHeight = 9;
 constexpr double kInitialTilt = 0.01;     // rad
 constexpr double kInitialHeading = 0.03;  // rad
 constexpr double kInitialBias = 3e-4;     // rad/s
+// A static window that is not still starts again: it is looked at this often.
+constexpr Stamp kStillnessCheck = kNanosecondsPerSecond / 4;
 
 // Specific gas constant of dry air (J/(kg K)) and the standard atmosphere's temperature at sea
 // level (K): the pressure's scale height is R T / g.
@@ -49,19 +51,21 @@ void Ahrs::add_imu(const ImuSample& imu) {
 
 void Ahrs::collect_static(const ImuSample& imu) {
   StaticWindow& s = static_;
-  if (s.samples == 0) s.begin = imu.stamp;
+  if (s.samples == 0) s.begin = s.checked = imu.stamp;
   ++s.samples;
   s.gyro += imu.gyro_radps;
   s.gyro2 += imu.gyro_radps.cwiseAbs2();
   s.accel += imu.accel_mps2;
   s.accel2 += imu.accel_mps2.cwiseAbs2();
-  if (to_seconds(imu.stamp - s.begin) < config_.initialisation_s) return;
-  const StaticWindow window = s;
-  s = {};
-  const bool still =
-      largest_deviation(window.gyro, window.gyro2, window.samples) < config_.still_gyro_radps &&
-      largest_deviation(window.accel, window.accel2, window.samples) < config_.still_accel_mps2;
-  if (still && window.fields > 0) initialise(window);
+  if (imu.stamp - s.checked < kStillnessCheck) return;
+  s.checked = imu.stamp;
+  const bool still = largest_deviation(s.gyro, s.gyro2, s.samples) < config_.still_gyro_radps &&
+                     largest_deviation(s.accel, s.accel2, s.samples) < config_.still_accel_mps2;
+  if (!still) {
+    s = {};
+  } else if (to_seconds(imu.stamp - s.begin) >= config_.initialisation_s && s.fields > 0) {
+    initialise(s);
+  }
 }
 
 void Ahrs::initialise(const StaticWindow& window) {

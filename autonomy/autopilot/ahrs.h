@@ -50,6 +50,7 @@ class Ahrs {
   struct StaticWindow {
     int samples = 0;
     Stamp begin = 0;
+    Stamp checked = 0;
     Vec3 gyro = Vec3::Zero(), gyro2 = Vec3::Zero();
     Vec3 accel = Vec3::Zero(), accel2 = Vec3::Zero();
     int fields = 0;

@@ -9,7 +9,8 @@
 namespace arex::worlds::garage {
 namespace {
 
-constexpr Interval kYardX{-8.0, 24.0};  // the walled forecourt, m
+constexpr double kYardBehind = 8.0;   // the walled forecourt, from the start back, m
+constexpr double kYardBeyond = 15.0;  // and from the portal on, m
 constexpr Interval kYardY{-10.0, 10.0};
 constexpr double kYardWall = 2.4;  // height, m
 constexpr double kParapet = 1.0;   // height above the ground, m
@@ -38,7 +39,7 @@ struct RampFrame {
 void add_ground(const Site& site) {
   const GaragePlan& plan = site.plan;
   const auto object = site.add(SurfaceClass::kGround, site.recipe.reflectivity.asphalt);
-  const double x0 = kYardX.low - kGarageWall, x1 = plan.hall_x.high + kGarageWall;
+  const double x0 = -kYardBehind - kGarageWall, x1 = plan.hall_x.high + kGarageWall;
   const double y0 = plan.hall_y.low - kGarageWall, y1 = plan.hall_y.high + kGarageWall;
   const double opening = plan.shaft_y.high;
   const auto add = [&](double ax, double bx, double ay, double by) {
@@ -118,10 +119,11 @@ void add_roof(const Site& site, const RampFrame& ramp) {
   const double soffit = ramp.z(plan.portal_x) + storey;
   add_tiled_box(site.mesh, site.add(SurfaceClass::kWall, shade.concrete),
                 {{plan.portal_x - kGarageWall, -half, soffit}, {plan.portal_x, half, kParapet}});
-  constexpr double kBarBefore = 0.8, kBarHeight = 2.9, kBarRadius = 0.06;  // m
+  constexpr double kBarBefore = 0.8, kBarRadius = 0.06;  // m
+  constexpr double kBarHeight = 0.83;                    // of the storey, above the ramp
   const double bar_x = plan.portal_x - kBarBefore;
-  const std::array<Vec3, 2> bar{Vec3(bar_x, -half, ramp.z(bar_x) + kBarHeight),
-                                Vec3(bar_x, half, ramp.z(bar_x) + kBarHeight)};
+  const std::array<Vec3, 2> bar{Vec3(bar_x, -half, ramp.z(bar_x) + kBarHeight * storey),
+                                Vec3(bar_x, half, ramp.z(bar_x) + kBarHeight * storey)};
   const std::array<double, 2> radii{kBarRadius, kBarRadius};
   const auto object = site.add(SurfaceClass::kPipe, shade.safety_paint);
   site.mesh.add_tube(object, bar, radii, 10);
@@ -164,7 +166,7 @@ void add_yard_walls(const Site& site) {
                   {{x0, y0, 0}, {x1, y1, kYardWall}});
   };
   const double t = kGarageWall;
-  const Interval &x = kYardX, &y = kYardY;
+  const Interval x{-kYardBehind, site.plan.portal_x + kYardBeyond}, y = kYardY;
   wall(x.low - t, x.low, y.low - t, y.high + t);
   wall(x.high, x.high + t, y.low - t, y.high + t);
   wall(x.low, x.high, y.low - t, y.low);

@@ -66,20 +66,21 @@ void add_door(const Site& site, const GarageRoom& room) {
 
 /// Switch cabinets along the wall opposite the door, and a tank in a corner.
 void add_equipment(const Site& site, const GarageRoom& room) {
-  constexpr double kDeep = 0.6, kWide = 0.8, kTall = 2.0, kOff = 0.15;  // m
-  constexpr double kTank = 0.5, kTankHalf = 0.9;                        // m
+  constexpr double kDeep = 0.6, kWide = 0.8, kTall = 2.0, kJoint = 0.02, kOff = 0.15;  // m
+  constexpr double kTank = 0.5, kTankHalf = 0.9;                                       // m
   const double z0 = site.recipe.floor_z_m;
   const double inward = -room.outward.y();
   const double back = (inward > 0 ? room.y.high : room.y.low) - inward * (0.5 * kGarageWall + kOff);
   const double front = back - inward * kDeep;
   const double start = room.x.low + 0.5 * site.recipe.pillar_width_m + kOff;
+  const double tank_low = room.x.high - 0.5 * site.recipe.pillar_width_m - kOff - 2 * kTank;
   for (int i = 0; i < 4; ++i) {
-    const double x = start + i * (kWide + 0.02);
+    const double x = start + i * (kWide + kJoint);
+    if (x + kWide > tank_low) break;
     add_small_box(site.mesh, site.add(SurfaceClass::kPipe, site.recipe.reflectivity.metal),
                   {{x, std::min(back, front), z0}, {x + kWide, std::max(back, front), z0 + kTall}});
   }
-  const double x = room.x.high - 0.5 * site.recipe.pillar_width_m - kOff - kTank;
-  const Pose X_WP{Mat3::Identity(), Vec3(x, back - inward * kTank, z0 + kTankHalf)};
+  const Pose X_WP{Mat3::Identity(), Vec3(tank_low + kTank, back - inward * kTank, z0 + kTankHalf)};
   site.mesh.add_solid_cylinder(site.add(SurfaceClass::kPipe, site.recipe.reflectivity.metal), X_WP,
                                kTank, kTankHalf, 16);
 }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kApron = 2.0;        // level ground between the start and the ramp, m
 constexpr double kSoffit = 0.6;       // of the portal, below the ground: a slab and its finish, m
-constexpr double kLeastRoom = 3.0;    // a shallower cell stays a row of bays, m
+constexpr double kLeastRoom = 3.5;    // a shallower cell stays a row of bays, m
 constexpr double kTurningRoom = 5.0;  // clear length at the ramp's foot, m
 
 /// A cell of the pillar grid that a room may fill.

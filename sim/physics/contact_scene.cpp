@@ -1,6 +1,7 @@
 #include "physics/contact_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -70,7 +71,9 @@ int require_name(const mjModel& model, mjtObj kind, const std::string& name) {
 }  // namespace
 
 MujocoModel compile_model(const std::string& scene_xml) {
-  mju_user_warning = ignore_warning;
+  // MuJoCo would print, and write a log file. Once: its hook is a global.
+  static const bool quiet = (mju_user_warning = ignore_warning, true);
+  static_cast<void>(quiet);
   // The struct holds 2 MB of file names: not for the stack.
   const auto free_files = [](mjVFS* files) {
     mj_deleteVFS(files);

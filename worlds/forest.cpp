@@ -139,17 +139,19 @@ void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const Hei
 
 }  // namespace
 
-std::vector<Vec2> place_trees(const ForestRecipe& recipe, std::uint64_t seed) {
+std::vector<TreeSite> place_trees(const ForestRecipe& recipe, std::uint64_t seed) {
   const Vec2 corner = 0.5 * recipe.size_m - Vec2::Constant(recipe.edge_m);
-  std::vector<Vec2> trees =
-      scatter_discs(-corner, corner, recipe.tree_density_per_m2, recipe.min_spacing_m,
-                    RandomStream(seed, "worlds/forest/trees"));
-  // Clearing comes after placing, so that the rest of the forest stays as it was.
   const double reach = recipe.tree.trunk_radius_max_m * (1 + recipe.tree.root_flare);
-  std::erase_if(trees, [&](const Vec2& p) {
-    return p.norm() < recipe.start_radius_m + reach || is_cleared(recipe, p, reach);
-  });
-  return trees;
+  std::vector<TreeSite> sites;
+  std::uint64_t index = 0;
+  for (const Vec2& p :
+       scatter_discs(-corner, corner, recipe.tree_density_per_m2, recipe.min_spacing_m,
+                     RandomStream(seed, "worlds/forest/trees"))) {
+    const bool cleared = p.norm() < recipe.start_radius_m + reach || is_cleared(recipe, p, reach);
+    if (!cleared) sites.push_back({p, index});
+    ++index;
+  }
+  return sites;
 }
 
 World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
@@ -160,16 +162,19 @@ World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
       builder.add_object(SurfaceClass::kGround, kForestFloorReflectivity.draw(ground_stream)),
       terrain);
 
+  constexpr double kRim = 0.15;  // wood and leaves end this far inside the ground's border, m
+  const Vec2 reach = -terrain.origin - Vec2::Constant(kRim);
   const Allowed allowed = [&](const Vec3& p) {
     const Vec2 xy = p.head<2>();
-    if (xy.norm() < recipe.start_radius_m) return false;
+    if (xy.norm() < recipe.start_radius_m || (xy.cwiseAbs().array() > reach.array()).any()) {
+      return false;
+    }
     return p.z() - terrain.at(p.x(), p.y()) > kClearHeight || !is_cleared(recipe, xy, 0);
   };
   const RandomStream tree_stream(seed, "worlds/forest/tree");
-  std::uint64_t index = 0;
-  for (const Vec2& p : place_trees(recipe, seed)) {
+  for (const auto& [p, index] : place_trees(recipe, seed)) {
     add_tree(builder, recipe.tree, {p.x(), p.y(), terrain.at(p.x(), p.y())}, allowed,
-             tree_stream.fork(index++));
+             tree_stream.fork(index));
   }
   add_undergrowth(builder, recipe, terrain, seed);
 

@@ -68,7 +68,7 @@ struct ForestRecipe {
   Vec2 size_m = {60, 50};
   double edge_m = 3;
   double tree_density_per_m2 = 0.10;
-  double min_spacing_m = 1.8;
+  double min_spacing_m = 1.6;
   double relief_m = 0.5;
   double relief_wavelength_m = 14;
   double roughness_m = 0.02;
@@ -94,7 +94,7 @@ struct ForestRecipe {
     f("clearings", clearings, "treeless discs");
     f("corridors", corridors, "treeless ways");
     f.check(size_m.minCoeff() >= 10 && size_m.maxCoeff() <= 500, "10 <= size_m <= 500");
-    f.check(edge_m >= 0 && 2 * edge_m < size_m.minCoeff(), "0 <= edge_m < half the least size_m");
+    f.check(edge_m >= 1 && 2 * edge_m < size_m.minCoeff(), "1 <= edge_m < half the least size_m");
     f.check(tree_density_per_m2 >= 0, "tree_density_per_m2 >= 0");
     f.check(min_spacing_m > 0, "min_spacing_m > 0");
     f.check(can_pack(tree_density_per_m2, min_spacing_m),
@@ -111,7 +111,14 @@ struct ForestRecipe {
 /// leaf.
 World build_forest(const ForestRecipe& recipe, std::uint64_t seed);
 
-/// Where the trees stand, x and y: Poisson-disc points less those on cleared ground.
-std::vector<Vec2> place_trees(const ForestRecipe& recipe, std::uint64_t seed);
+/// Where a tree stands, x and y; the index names its random stream, so that it grows the same
+/// whichever others are cleared away.
+struct TreeSite {
+  Vec2 position;
+  std::uint64_t index;
+};
+
+/// Poisson-disc points less those on cleared ground.
+std::vector<TreeSite> place_trees(const ForestRecipe& recipe, std::uint64_t seed);
 
 }  // namespace arex::worlds

@@ -217,10 +217,15 @@ FreeSpace flood_free_space(const OccupancyGrid& occupancy, const Vec3& start, do
   const GridGeometry& grid = occupancy.grid;
   FreeSpace space{grid, std::vector<std::uint8_t>(grid.cells(), 0),
                   std::vector<std::uint8_t>(grid.cells(), 0)};
-  const std::vector<float> distance = squared_distances(occupancy);
-  const auto limit = static_cast<float>(std::pow(radius_m / grid.resolution_m, 2));
-  std::transform(distance.begin(), distance.end(), space.passable.begin(),
-                 [&](float d) { return static_cast<std::uint8_t>(d > limit); });
+  if (radius_m > 0) {
+    const std::vector<float> distance = squared_distances(occupancy);
+    const auto limit = static_cast<float>(std::pow(radius_m / grid.resolution_m, 2));
+    std::transform(distance.begin(), distance.end(), space.passable.begin(),
+                   [&](float d) { return static_cast<std::uint8_t>(d > limit); });
+  } else {
+    std::transform(occupancy.occupied.begin(), occupancy.occupied.end(), space.passable.begin(),
+                   [](std::uint8_t occupied) { return static_cast<std::uint8_t>(!occupied); });
+  }
 
   const Eigen::Vector3i start_cell = grid.cell_of(start);
   if (!grid.contains(start_cell) || !space.passable[grid.index(start_cell)]) return space;

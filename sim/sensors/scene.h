@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "math/types.h"
+#include "worlds/world.h"
+
+namespace arex::sim {
+
+/// What a ray meets first.
+struct Hit {
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+  double distance_m = std::numeric_limits<double>::infinity();
+  Vec3 normal_W = Vec3::Zero();    ///< unit, towards the ray's origin
+  std::uint32_t triangle = kNone;  ///< index into Mesh::triangles
+  std::uint32_t object = kNone;    ///< index into World::objects
+
+  [[nodiscard]] bool valid() const { return triangle != kNone; }
+};
+
+/// A ray of a batch. Only the part between the two distances is searched.
+struct Ray {
+  Vec3f origin_W = Vec3f::Zero();      ///< m
+  Vec3f direction_W = Vec3f::UnitX();  ///< unit
+  float min_distance_m = 0;
+  float max_distance_m = 0;
+};
+
+/// What a ray of a batch meets first; the same answer as Hit, in the form the LiDAR needs.
+struct RayHit {
+  float distance_m = std::numeric_limits<float>::infinity();
+  Vec3f normal_W = Vec3f::Zero();  ///< unit, not oriented
+  float reflectivity = 0;
+  std::uint32_t object = Hit::kNone;
+
+  [[nodiscard]] bool valid() const { return object != Hit::kNone; }
+};
+
+/// Ray casts and distances against the triangles of one world. Constant once built: any number of
+/// threads may ask.
+///
+/// Embree answers which triangle a ray meets; the distance comes from that triangle's plane in our
+/// own arithmetic, because Embree's reciprocals differ in the last bits between CPU vendors.
+class Scene {
+ public:
+  explicit Scene(const worlds::World& world);
+  ~Scene();
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  /// First surface along a unit direction, at most `max_distance_m` away.
+  [[nodiscard]] Hit cast(const Vec3& origin_W, const Vec3& direction_W,
+                         double max_distance_m) const;
+
+  /// The same for many rays, in packets of eight consecutive ones: fast where neighbours in the
+  /// span are neighbours in space. A ray whose max_distance_m is negative meets nothing.
+  void cast(std::span<const Ray> rays, std::span<RayHit> hits) const;
+
+  enum class Surfaces : std::uint8_t { kAll, kWithoutLeaves };
+  /// Distance from a point to the nearest triangle, exact; `max_distance_m` where none is nearer.
+  [[nodiscard]] double distance_to_surface(const Vec3& p_W, double max_distance_m,
+                                           Surfaces surfaces = Surfaces::kWithoutLeaves) const;
+
+ private:
+  struct Embree;
+  std::unique_ptr<Embree> embree_;
+};
+
+}  // namespace arex::sim

@@ -1,6 +1,7 @@
 #include "sensors/renderer_culling.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace arex::sim {
@@ -65,6 +66,56 @@ double ViewVolume::nearest_depth(const Eigen::AlignedBox3f& box) const {
   return back.offset - kMargin - support(-back.normal, box);
 }
 
+std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh) {
+  // Surfaces: vertices joined by triangles, each named by one of its vertices.
+  std::vector<std::uint32_t> parent(mesh.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto surface_of = [&parent](std::uint32_t vertex) {
+    while (parent[vertex] != vertex) vertex = parent[vertex] = parent[parent[vertex]];
+    return vertex;
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    parent[surface_of(b)] = surface_of(a);
+    parent[surface_of(c)] = surface_of(a);
+  }
+  std::vector<std::uint32_t> triangle_count(mesh.vertices.size(), 0);
+  for (const auto& triangle : mesh.triangles) ++triangle_count[surface_of(triangle[0])];
+
+  // Six times the volume of each surface, and its edges with the direction in the lowest bit.
+  std::vector<double> volume(mesh.vertices.size(), 0);
+  std::vector<std::uint64_t> edges;
+  constexpr std::uint32_t kFewestOfASolid = 4;
+  for (const auto& triangle : mesh.triangles) {
+    const std::uint32_t surface = surface_of(triangle[0]);
+    if (triangle_count[surface] < kFewestOfASolid) continue;
+    const Vec3f& origin = mesh.vertices[surface];
+    const Vec3 a = (mesh.vertices[triangle[0]] - origin).cast<double>();
+    const Vec3 b = (mesh.vertices[triangle[1]] - origin).cast<double>();
+    const Vec3 c = (mesh.vertices[triangle[2]] - origin).cast<double>();
+    volume[surface] += a.dot(b.cross(c));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint64_t from = triangle[k], to = triangle[(k + 1) % 3];
+      edges.push_back(std::min(from, to) << 33U | std::max(from, to) << 1U | (from < to ? 1U : 0U));
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  std::vector<bool> open(mesh.vertices.size(), false);
+  for (std::size_t i = 0; i < edges.size();) {
+    std::size_t end = i + 1;
+    while (end < edges.size() && edges[end] >> 1U == edges[i] >> 1U) ++end;
+    const bool matched = end - i == 2 && edges[i] != edges[i + 1];
+    if (!matched) open[surface_of(static_cast<std::uint32_t>(edges[i] >> 33U))] = true;
+    i = end;
+  }
+  std::vector<std::int8_t> winding(mesh.triangles.size(), 0);
+  for (std::size_t t = 0; t < winding.size(); ++t) {
+    const std::uint32_t surface = surface_of(mesh.triangles[t][0]);
+    if (open[surface] || volume[surface] == 0) continue;
+    winding[t] = volume[surface] > 0 ? 1 : -1;
+  }
+  return winding;
+}
+
 ClusteredMesh cluster_mesh(const worlds::Mesh& mesh, std::uint32_t max_triangles) {
   ClusteredMesh out;
   out.triangles.reserve(mesh.triangles.size());
@@ -72,34 +123,45 @@ ClusteredMesh cluster_mesh(const worlds::Mesh& mesh, std::uint32_t max_triangles
   out.vertices.reserve(mesh.vertices.size());
   constexpr std::uint32_t kUnused = 0xFFFFFFFFU;
   std::vector<std::uint32_t> new_index(mesh.vertices.size(), kUnused);
+  const std::vector<std::int8_t> winding = outward_winding(mesh);
+
+  const auto add_to_last_cluster = [&](std::uint32_t source) {
+    worlds::Chunk& cluster = out.clusters.back();
+    std::array<std::uint32_t, 3> triangle = mesh.triangles[source];
+    if (winding[source] < 0) std::swap(triangle[1], triangle[2]);
+    for (std::uint32_t& vertex : triangle) {
+      const Vec3f& p = mesh.vertices[vertex];
+      cluster.bounds.extend(p);
+      if (new_index[vertex] == kUnused) {
+        new_index[vertex] = static_cast<std::uint32_t>(out.vertices.size());
+        out.vertices.push_back(p);
+      }
+      vertex = new_index[vertex];
+    }
+    out.triangles.push_back(triangle);
+    out.source.push_back(source);
+    ++cluster.triangle_count;
+  };
+
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // Morton code, triangle
   for (const worlds::Chunk& chunk : mesh.chunks) {
-    order.clear();
-    for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
-      const std::uint32_t triangle = chunk.first_triangle + i;
-      const auto& [a, b, c] = mesh.triangles[triangle];
-      const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
-      order.emplace_back(morton_code(centroid, chunk.bounds), triangle);
-    }
-    std::sort(order.begin(), order.end());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      if (i % max_triangles == 0) {
-        out.clusters.push_back({static_cast<std::uint32_t>(out.triangles.size()), 0, {}});
+    for (const bool closed : {true, false}) {
+      order.clear();
+      for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
+        const std::uint32_t triangle = chunk.first_triangle + i;
+        if ((winding[triangle] != 0) != closed) continue;
+        const auto& [a, b, c] = mesh.triangles[triangle];
+        const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
+        order.emplace_back(morton_code(centroid, chunk.bounds), triangle);
       }
-      worlds::Chunk& cluster = out.clusters.back();
-      std::array<std::uint32_t, 3> triangle = mesh.triangles[order[i].second];
-      for (std::uint32_t& vertex : triangle) {
-        const Vec3f& p = mesh.vertices[vertex];
-        cluster.bounds.extend(p);
-        if (new_index[vertex] == kUnused) {
-          new_index[vertex] = static_cast<std::uint32_t>(out.vertices.size());
-          out.vertices.push_back(p);
+      std::sort(order.begin(), order.end());
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        if (i % max_triangles == 0) {
+          out.clusters.push_back({static_cast<std::uint32_t>(out.triangles.size()), 0, {}});
+          out.closed.push_back(closed);
         }
-        vertex = new_index[vertex];
+        add_to_last_cluster(order[i].second);
       }
-      out.triangles.push_back(triangle);
-      out.source.push_back(order[i].second);
-      ++cluster.triangle_count;
     }
   }
   return out;

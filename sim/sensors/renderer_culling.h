@@ -29,13 +29,21 @@ class ViewVolume {
   std::vector<Plane> planes_;  ///< left, right, top, bottom, back, far
 };
 
+/// For each triangle: +1 if it belongs to a closed surface and its corners run counter-clockwise
+/// seen from outside, -1 if clockwise, 0 if its surface is open (a leaf, the terrain). A surface is
+/// what hangs together by shared vertices; it is closed if each of its edges is run through exactly
+/// once in either direction.
+std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh);
+
 /// A mesh cut finer than its chunks, for culling: a view touches the clusters it needs and few
 /// more.
 struct ClusteredMesh {
-  std::vector<Vec3f> vertices;                          ///< in W, in the order of their first use
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< the mesh's own, grouped by cluster
-  std::vector<std::uint32_t> source;                    ///< of each triangle: its index in the mesh
-  std::vector<worlds::Chunk> clusters;                  ///< cover all triangles once, in order
+  std::vector<Vec3f> vertices;  ///< in W, in the order of their first use
+  /// The mesh's own, grouped by cluster; those of closed surfaces counter-clockwise from outside.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::uint32_t> source;    ///< of each triangle: its index in the mesh
+  std::vector<worlds::Chunk> clusters;  ///< cover all triangles once, in order
+  std::vector<bool> closed;             ///< of each cluster: all its triangles bound solids
 };
 
 /// Each chunk's triangles along a Morton curve, cut into runs of at most `max_triangles`.

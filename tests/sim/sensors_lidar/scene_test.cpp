@@ -1,0 +1,195 @@
+#include "sensors/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "math/random.h"
+#include "sim/sensors_lidar/test_world.h"
+
+namespace arex::sim {
+namespace {
+
+worlds::World soup(std::uint64_t seed, int count) {
+  RandomStream stream(seed, "soup");
+  test::WorldMaker maker;
+  for (int i = 0; i < count; ++i) {
+    if (i % 10 == 0) {
+      maker.object(static_cast<float>(stream.uniform()),
+                   i % 20 == 0 ? worlds::SurfaceClass::kLeaf : worlds::SurfaceClass::kTrunk);
+    }
+    const Vec3 centre(stream.uniform(-10, 10), stream.uniform(-10, 10), stream.uniform(-10, 10));
+    maker.triangle(centre + stream.normal3(), centre + stream.normal3(), centre + stream.normal3());
+  }
+  return maker.world();
+}
+
+std::array<Vec3, 3> corners(const worlds::World& world, std::size_t triangle) {
+  std::array<Vec3, 3> out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    out[i] = world.mesh.vertices[world.mesh.triangles[triangle][i]].cast<double>();
+  }
+  return out;
+}
+
+struct BruteHit {
+  double distance = std::numeric_limits<double>::infinity();
+  std::uint32_t triangle = Hit::kNone;
+  double margin = 1;  ///< how near the ray passes to any edge, in barycentric coordinates
+};
+
+BruteHit brute_cast(const worlds::World& world, const Vec3& o, const Vec3& d) {
+  BruteHit best;
+  for (std::size_t i = 0; i < world.mesh.triangles.size(); ++i) {
+    const auto [a, b, c] = corners(world, i);
+    Mat3 M;
+    M << b - a, c - a, -d;
+    const Vec3 x = M.partialPivLu().solve(o - a);  // u, v, distance
+    if (!x.allFinite() || x.z() < 0) continue;
+    const double inside = std::min({x.x(), x.y(), 1 - x.x() - x.y()});
+    best.margin = std::min(best.margin, std::abs(inside));
+    if (inside >= 0 && x.z() < best.distance) {
+      best.distance = x.z();
+      best.triangle = static_cast<std::uint32_t>(i);
+    }
+  }
+  return best;
+}
+
+double to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (a + t * (b - a) - p).norm();
+}
+
+double brute_distance(const worlds::World& world, const Vec3& p, bool leaves) {
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < world.mesh.triangles.size(); ++i) {
+    if (!leaves && world.class_of_triangle(i) == worlds::SurfaceClass::kLeaf) continue;
+    const auto [a, b, c] = corners(world, i);
+    best = std::min({best, to_segment(p, a, b), to_segment(p, b, c), to_segment(p, c, a)});
+    const Vec3 n = (b - a).cross(c - a).normalized();
+    const Vec3 foot = p - n.dot(p - a) * n;
+    const bool inside = n.dot((b - a).cross(foot - a)) >= 0 &&
+                        n.dot((c - b).cross(foot - b)) >= 0 && n.dot((a - c).cross(foot - c)) >= 0;
+    if (inside) best = std::min(best, std::abs(n.dot(p - a)));
+  }
+  return best;
+}
+
+TEST(Scene, CastAgreesWithEveryTriangleTried) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const worlds::World world = soup(seed, 300);
+    const Scene scene(world);
+    RandomStream stream(seed, "rays");
+    int hits = 0, compared = 0;
+    for (int i = 0; i < 1500; ++i) {
+      const Vec3 o = 6 * stream.normal3().cwiseMax(-2).cwiseMin(2);
+      const Vec3 d = stream.normal3().normalized();
+      const BruteHit expected = brute_cast(world, o, d);
+      if (expected.margin < 1e-5) continue;  // on an edge, single precision may decide otherwise
+      ++compared;
+      const Hit hit = scene.cast(o, d, 100);
+      ASSERT_EQ(hit.triangle, expected.triangle) << "seed " << seed << " ray " << i;
+      if (!hit.valid()) continue;
+      ++hits;
+      const auto [a, b, c] = corners(world, hit.triangle);
+      const Vec3 n = (b - a).cross(c - a).normalized();
+      ASSERT_NEAR(hit.distance_m, expected.distance, 1e-5 / std::abs(n.dot(d)));
+      ASSERT_EQ(hit.object, world.mesh.object_of_triangle[hit.triangle]);
+      ASSERT_NEAR(hit.normal_W.norm(), 1, 1e-12);
+      ASSERT_LT(hit.normal_W.dot(d), 0);
+      ASSERT_NEAR(std::abs(hit.normal_W.dot(n)), 1, 1e-6);
+      ASSERT_FALSE(scene.cast(o, d, 0.99 * hit.distance_m).valid());
+    }
+    EXPECT_GT(hits, 200);
+    EXPECT_GT(compared, 1400);
+  }
+}
+
+TEST(Scene, BatchAgreesWithSingleCasts) {
+  const worlds::World world = soup(4, 2000);
+  const Scene scene(world);
+  RandomStream stream(4, "batch");
+  for (const std::size_t count : {1U, 7U, 8U, 203U}) {  // whole packets and remainders
+    std::vector<Ray> rays(count);
+    std::vector<RayHit> hits(count);
+    for (Ray& ray : rays) {
+      ray.origin_W = (3 * stream.normal3()).cast<float>();
+      ray.direction_W = stream.normal3().normalized().cast<float>();
+      ray.max_distance_m = 50;
+    }
+    scene.cast(rays, hits);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Hit single =
+          scene.cast(rays[i].origin_W.cast<double>(), rays[i].direction_W.cast<double>(), 50);
+      ASSERT_EQ(hits[i].valid(), single.valid());
+      if (!single.valid()) continue;
+      ASSERT_EQ(hits[i].object, single.object);
+      const double cosine = std::abs(single.normal_W.dot(rays[i].direction_W.cast<double>()));
+      ASSERT_NEAR(hits[i].distance_m, single.distance_m, 1e-5 / cosine);
+      ASSERT_EQ(hits[i].reflectivity, world.objects[single.object].reflectivity);
+    }
+  }
+}
+
+TEST(Scene, BatchSearchesOnlyTheGivenStretch) {
+  test::WorldMaker maker;
+  maker.object(0.2F).quad({2, -5, -5}, {0, 10, 0}, {0, 0, 10});
+  maker.object(0.8F).quad({4, -5, -5}, {0, 10, 0}, {0, 0, 10});
+  const Scene scene(maker.world());
+  const std::vector<Ray> rays{{Vec3f::Zero(), Vec3f::UnitX(), 0, 10},
+                              {Vec3f::Zero(), Vec3f::UnitX(), 3, 10},
+                              {Vec3f::Zero(), Vec3f::UnitX(), 0, 1.5F},
+                              {Vec3f::Zero(), Vec3f::UnitX(), 0, -1}};
+  std::vector<RayHit> hits(rays.size());
+  scene.cast(rays, hits);
+  EXPECT_FLOAT_EQ(hits[0].distance_m, 2);
+  EXPECT_FLOAT_EQ(hits[1].distance_m, 4);
+  EXPECT_FLOAT_EQ(hits[1].reflectivity, 0.8F);
+  EXPECT_FALSE(hits[2].valid());
+  EXPECT_FALSE(hits[3].valid());
+}
+
+TEST(Scene, NoRaySlipsThroughASeam) {
+  // Ground of many triangles: every ray that points down must meet it.
+  test::WorldMaker maker;
+  maker.object(0.3F).surface(100, 100, [](double u, double v) {
+    return Vec3(40 * u - 20, 40 * v - 20, 0.3 * std::sin(9 * u) * std::cos(7 * v));
+  });
+  const Scene scene(maker.world());
+  RandomStream stream(5, "seam");
+  int lost = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    // Aimed at vertices and edges of the grid on purpose.
+    const Vec3 target(0.4 * stream.uniform_int(-40, 40), 0.4 * stream.uniform_int(-40, 40), 0);
+    const Vec3 o(stream.uniform(-5, 5), stream.uniform(-5, 5), 3);
+    lost += scene.cast(o, (target - o).normalized(), 100).valid() ? 0 : 1;
+  }
+  EXPECT_LE(lost, 1);
+}
+
+TEST(Scene, DistanceAgreesWithEveryTriangleTried) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const worlds::World world = soup(seed, 300);
+    const Scene scene(world);
+    RandomStream stream(seed, "points");
+    for (int i = 0; i < 1000; ++i) {
+      const Vec3 p = 6 * stream.normal3();
+      const double solid = brute_distance(world, p, false), all = brute_distance(world, p, true);
+      ASSERT_NEAR(scene.distance_to_surface(p, 100), solid, 1e-9);
+      ASSERT_NEAR(scene.distance_to_surface(p, 100, Scene::Surfaces::kAll), all, 1e-9);
+      ASSERT_NEAR(scene.distance_to_surface(p, 0.5), std::min(solid, 0.5), 1e-9);
+    }
+  }
+}
+
+TEST(Scene, EmptyWorldHoldsNothing) {
+  const worlds::World world;
+  const Scene scene(world);
+  EXPECT_FALSE(scene.cast(Vec3::Zero(), Vec3::UnitX(), 100).valid());
+  EXPECT_EQ(scene.distance_to_surface(Vec3::Zero(), 7), 7);
+}
+
+}  // namespace
+}  // namespace arex::sim

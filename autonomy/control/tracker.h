@@ -15,9 +15,9 @@ struct TrackerConfig {
   double min_lift_fraction = 0.2;  ///< of the weight: the vertical force is never less in the air
   double max_lift_fraction = 1.8;
   bool observe_disturbance = true;
-  double observer_bandwidth_radps = 1.0;
+  double observer_bandwidth_radps = 1.5;
   double observer_limit_n = 4.0;  ///< a fifth of the weight
-  double attitude_lag_s = 0.2;    ///< from the demanded force to the real one
+  double attitude_lag_s = 0.15;   ///< from the demanded force to the real one
   double rate_hz = 100;           ///< paper, IV
 
   void fields(auto& f) {

@@ -1,0 +1,276 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+
+#include "closed_loop.h"
+#include "math/so3.h"
+
+namespace arex::sim {
+namespace {
+
+using test::ClosedLoop;
+using test::ErrorStatistics;
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::uint64_t kSeeds[] = {1, 2, 3};
+const Vec3 kLightWind(1.6, -1.2, 0);  // 2 m/s, with the gusts of the specification
+
+ClosedLoop::Options options_in(const Vec3& wind) {
+  ClosedLoop::Options options;
+  options.physics.wind.mean_mps = wind;
+  options.physics.wind.turbulence_scale = wind.norm() > 0 ? 1 : 0;
+  return options;
+}
+
+/// Where to be at a time after the start, s.
+using Reference = std::function<TrajectorySetpoint(double)>;
+
+/// Flies a reference for a time. Calls `see` with the time and the setpoint after each tick.
+void fly(ClosedLoop& loop, double seconds, const Reference& reference,
+         const std::function<void(double, const TrajectorySetpoint&)>& see) {
+  const Stamp start = loop.physics.truth().stamp;
+  for (double t = 0; t < seconds; t = to_seconds(loop.physics.truth().stamp - start)) {
+    const TrajectorySetpoint setpoint = reference(t);
+    loop.step(setpoint);
+    see(t, setpoint);
+    ASSERT_EQ(loop.physics.collision(), nullptr) << t;
+  }
+}
+
+/// Arms, climbs to 1.5 m over the start and waits there for three seconds.
+void take_off(ClosedLoop& loop) {
+  ASSERT_TRUE(loop.start());
+  TimedPath path({}, Vec3::Zero(), 0);
+  path.climb_to(1.5);
+  path.wait(3);
+  const auto reference = [&](double t) { return path.sample(t); };
+  fly(loop, path.duration_s(), reference, [&](double, const TrajectorySetpoint& setpoint) {
+    ASSERT_LT((loop.odometry().X_OB.p - setpoint.p_OB).norm(), 0.2);
+  });
+  ASSERT_EQ(loop.autopilot.state(), AutopilotState::kFlying);
+}
+
+TrajectorySetpoint hover_point() {
+  TrajectorySetpoint setpoint;
+  setpoint.p_OB = {0, 0, 1.5};
+  return setpoint;
+}
+
+TEST(Flight, HoversOnItsOwnSensors) {
+  for (const Vec3& wind : {Vec3(Vec3::Zero()), kLightWind}) {
+    for (const std::uint64_t seed : kSeeds) {
+      ClosedLoop loop(options_in(wind), seed);
+      ASSERT_NO_FATAL_FAILURE(take_off(loop));
+      ErrorStatistics position, tilt;
+      fly(
+          loop, 30, [](double) { return hover_point(); },
+          [&](double, const TrajectorySetpoint& setpoint) {
+            position.add((loop.odometry().X_OB.p - setpoint.p_OB).norm());
+            tilt.add(loop.tilt_error());
+          });
+      EXPECT_LT(position.rms(), wind.norm() > 0 ? 0.03 : 0.01);
+      // The accelerometer's bias leaves 0.3 degrees, 1 sigma on each axis, in any levelling.
+      EXPECT_LT(tilt.max(), 1.2 * kDegree);
+      RecordProperty("hover_rms_mm", static_cast<int>(1e3 * position.rms()));
+    }
+  }
+}
+
+TEST(Flight, PdAloneStandsOffInTheWindByItsForceOverTheGain) {
+  ClosedLoop::Options options = options_in(kLightWind);
+  options.physics.wind.turbulence_scale = 0;
+  options.tracker.observe_disturbance = false;
+  for (const std::uint64_t seed : kSeeds) {
+    ClosedLoop loop(options, seed);
+    ASSERT_NO_FATAL_FAILURE(take_off(loop));
+    Vec3 mean = Vec3::Zero();
+    fly(
+        loop, 10, [](double) { return hover_point(); },
+        [&](double, const TrajectorySetpoint& setpoint) {
+          mean += 1e-4 * (loop.odometry().X_OB.p - setpoint.p_OB);
+        });
+    // Rotor drag at 2 m/s and hover thrust, and the airframe's, along the wind.
+    const RotorConfig rotor;
+    const DragConfig drag;
+    const double speed = kLightWind.norm();
+    const double force =
+        rotor.drag_s_per_m * 1.9 * kGravity * speed +
+        0.5 * drag.air_density_kgpm3 * drag.drag_area_m2.head<2>().mean() * speed * speed;
+    // The rest is what the tilt error adds: its degree is 3 cm.
+    const double tilt_share =
+        1.9 * kGravity * loop.tilt_error() / options.tracker.position_gain.x();
+    const double expected = force / options.tracker.position_gain.x();
+    EXPECT_NEAR(mean.head<2>().norm(), expected, tilt_share + 0.01);
+    EXPECT_GT(mean.head<2>().norm(), 0.03);
+  }
+}
+
+TEST(Flight, StepOfOneMetreSettlesWithoutLargeOvershoot) {
+  for (const std::uint64_t seed : kSeeds) {
+    for (int axis = 0; axis < 3; ++axis) {
+      ClosedLoop loop(options_in(Vec3::Zero()), seed);
+      ASSERT_NO_FATAL_FAILURE(take_off(loop));
+      TrajectorySetpoint target = hover_point();
+      target.p_OB += Vec3::Unit(axis);
+      double reached_s = -1, furthest = 0;
+      ErrorStatistics settled, across;
+      fly(
+          loop, 8, [&](double) { return target; },
+          [&](double t, const TrajectorySetpoint& setpoint) {
+            const Vec3 moved = loop.odometry().X_OB.p - hover_point().p_OB;
+            furthest = std::max(furthest, moved[axis]);
+            if (reached_s < 0 && moved[axis] > 0.9) reached_s = t;
+            across.add((moved - moved[axis] * Vec3::Unit(axis)).norm());
+            if (t > 6) settled.add((loop.odometry().X_OB.p - setpoint.p_OB).norm());
+          });
+      EXPECT_GT(reached_s, 0) << axis;
+      EXPECT_LT(reached_s, 2.0) << axis;
+      EXPECT_LT(furthest, 1.25) << axis;
+      EXPECT_LT(across.max(), 0.12) << axis;
+      EXPECT_LT(settled.max(), 0.03) << axis;
+    }
+  }
+}
+
+TEST(Flight, FollowsACircleNoseAhead) {
+  constexpr double kRadius = 3, kSpeed = 1.5, kRate = kSpeed / kRadius;
+  // The phase starts from rest: constant angular acceleration for two seconds.
+  const auto circle = [&](double t) {
+    const double up = std::min(t, 2.0);
+    const double phase = kRate * (up * up / 4 + (t - up));
+    const double rate = kRate * up / 2, acceleration = t < 2 ? kRate / 2 : 0;
+    const Vec3 out(std::sin(phase), -std::cos(phase), 0),
+        along(std::cos(phase), std::sin(phase), 0);
+    TrajectorySetpoint s = hover_point();
+    s.p_OB += kRadius * (out + Vec3(0, 1, 0));
+    s.v_OB = kRadius * rate * along;
+    s.a_OB = kRadius * (acceleration * along - rate * rate * out);
+    s.yaw_rad = so3::wrap(phase);
+    s.yaw_rate_radps = rate;
+    return s;
+  };
+  for (const Vec3& wind : {Vec3(Vec3::Zero()), kLightWind}) {
+    for (const std::uint64_t seed : kSeeds) {
+      ClosedLoop loop(options_in(wind), seed);
+      ASSERT_NO_FATAL_FAILURE(take_off(loop));
+      ErrorStatistics position, yaw;
+      fly(loop, 30, circle, [&](double, const TrajectorySetpoint& setpoint) {
+        position.add((loop.odometry().X_OB.p - setpoint.p_OB).norm());
+        yaw.add(so3::wrap(so3::yaw(loop.odometry().X_OB.R) - setpoint.yaw_rad));
+      });
+      EXPECT_LT(position.rms(), 0.08);
+      EXPECT_LT(yaw.rms(), 4 * kDegree);
+    }
+  }
+}
+
+/// Four legs with turns, from take-off to disarming.
+struct Mission {
+  double tracking_rms = 0, touchdown_speed = 0, landing_error = 0, disarm_delay_s = 0;
+  double tilt_error_max = 0;
+  bool disarmed = false, collided = false;
+};
+Mission fly_mission(ClosedLoop& loop) {
+  TimedPath path({}, Vec3::Zero(), 0);
+  path.climb_to(1.5);
+  for (const Vec3& corner : {Vec3(6, 0, 1.5), Vec3(6, 6, 2.0), Vec3(0, 6, 1.0), Vec3(0, 0, 1.5)}) {
+    path.fly_to(corner);
+  }
+  path.land_to(-1.5);
+  Mission out;
+  ErrorStatistics tracking;
+  const Stamp start = loop.physics.truth().stamp;
+  double touchdown_s = 0, t = 0;
+  while (loop.autopilot.armed() && t < path.duration_s() + 5) {
+    const TrajectorySetpoint setpoint = path.sample(t);
+    const double sink = -loop.odometry().v_OB.z();
+    loop.step(setpoint);
+    t = to_seconds(loop.physics.truth().stamp - start);
+    const Vec3 error = loop.odometry().X_OB.p - setpoint.p_OB;
+    const bool touching = !loop.physics.contacts().empty();
+    if (t > 3 && touching && touchdown_s == 0) {
+      touchdown_s = t;
+      out.touchdown_speed = sink;
+    }
+    if (t > 0.5 && touchdown_s == 0) tracking.add(error.norm());
+    if (touchdown_s == 0) out.tilt_error_max = std::max(out.tilt_error_max, loop.tilt_error());
+    out.collided |= loop.physics.collision() != nullptr;
+  }
+  out.tracking_rms = tracking.rms();
+  out.landing_error = loop.odometry().X_OB.p.head<2>().norm();
+  out.disarm_delay_s = t - touchdown_s;
+  out.disarmed = !loop.autopilot.armed();
+  return out;
+}
+
+TEST(Flight, TakesOffFliesLegsLandsAndDisarms) {
+  for (const Vec3& wind : {Vec3(Vec3::Zero()), kLightWind}) {
+    for (const std::uint64_t seed : kSeeds) {
+      ClosedLoop loop(options_in(wind), seed);
+      ASSERT_TRUE(loop.start());
+      const Mission m = fly_mission(loop);
+      EXPECT_LT(m.tracking_rms, 0.07);
+      EXPECT_FALSE(m.collided);
+      EXPECT_TRUE(m.disarmed);
+      EXPECT_LT(m.touchdown_speed, 0.6);
+      EXPECT_LT(m.landing_error, 0.15);
+      EXPECT_LT(m.disarm_delay_s, 3.0);
+      EXPECT_LT(m.tilt_error_max, 1.2 * kDegree);
+      EXPECT_TRUE(loop.physics.landed());
+    }
+  }
+}
+
+TEST(Flight, ThePapersPdAloneFliesTheLegsInLightWindToo) {
+  for (const std::uint64_t seed : kSeeds) {
+    ClosedLoop::Options options = options_in(kLightWind);
+    options.tracker.observe_disturbance = false;
+    ClosedLoop loop(options, seed);
+    ASSERT_TRUE(loop.start());
+    const Mission m = fly_mission(loop);
+    EXPECT_LT(m.tracking_rms, 0.15);
+    EXPECT_TRUE(m.disarmed);
+    EXPECT_FALSE(m.collided);
+  }
+}
+
+TEST(Flight, ComesDownByItselfWhenTheStackFallsSilent) {
+  for (const std::uint64_t seed : kSeeds) {
+    ClosedLoop loop(options_in(kLightWind), seed);
+    ASSERT_NO_FATAL_FAILURE(take_off(loop));
+    double t = 0, impact = 0;
+    for (; t < 15 && loop.autopilot.armed(); t += 1e-3) {
+      loop.step_silent();
+      if (loop.physics.contacts().empty()) impact = -loop.odometry().v_OB.z();
+    }
+    EXPECT_FALSE(loop.autopilot.armed());
+    EXPECT_LT(impact, 0.9);
+    EXPECT_TRUE(loop.physics.landed());
+  }
+}
+
+TEST(Flight, LandDetectionIsSilentInDivesThroughRealAir) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    ClosedLoop loop(options_in(kLightWind), seed);
+    ASSERT_NO_FATAL_FAILURE(take_off(loop));
+    RandomStream random(seed, "dives");
+    TrajectorySetpoint setpoint = hover_point();
+    int left = 0;
+    double fastest = 0;
+    for (int i = 0; i < 30000; ++i) {
+      if (left-- <= 0) {  // jumps of the setpoint far up and down, and sideways
+        left = random.uniform_int(200, 2500);
+        setpoint.p_OB = {random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(8, 40)};
+      }
+      loop.step(setpoint);
+      fastest = std::max(fastest, -loop.odometry().v_OB.z());
+      ASSERT_EQ(loop.autopilot.state(), AutopilotState::kFlying) << seed << " " << i;
+    }
+    EXPECT_GT(fastest, 4.0);
+    EXPECT_LT(loop.tilt_error(), 3 * kDegree);
+  }
+}
+
+}  // namespace
+}  // namespace arex::sim

@@ -1,0 +1,213 @@
+#pragma once
+
+#include "math/types.h"
+
+namespace arex {
+
+/// What the filter believes of the IMU, and how it starts.
+struct ImuNoiseConfig {
+  double gyro_noise_density = 1e-3;         ///< rad/s/sqrt(Hz)
+  double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
+  double gyro_walk_density = 2e-5;          ///< rad/s^2/sqrt(Hz)
+  double accel_walk_density = 1e-3;         ///< m/s^3/sqrt(Hz)
+  double gyro_range_radps = 34.9;           ///< readings beyond this may be clipped
+  double clipped_gyro_noise_density = 0.3;  ///< of an axis at its limit, rad/s/sqrt(Hz)
+
+  void fields(auto& f) {
+    f("gyro_noise_density", gyro_noise_density,
+      "rad/s/sqrt(Hz): ten times the sensor's white noise (reference.md, 4) for aliased vibration");
+    f("accel_noise_density", accel_noise_density,
+      "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and the vibration that its filter aliases");
+    f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz) (reference.md, 4)");
+    f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz) (reference.md, 4)");
+    f("gyro_range_radps", gyro_range_radps, "full scale of the gyro, 2000 deg/s");
+    f("clipped_gyro_noise_density", clipped_gyro_noise_density,
+      "rad/s/sqrt(Hz) while an axis reads its full scale");
+    f.check(gyro_noise_density > 0 && accel_noise_density > 0, "noise densities > 0");
+    f.check(gyro_walk_density >= 0 && accel_walk_density >= 0, "walk densities >= 0");
+  }
+};
+
+/// Standing still before take-off: gravity, gyro bias, scale of the accelerometer.
+struct StaticInitialiserConfig {
+  double window_s = 1.0;
+  double max_gyro_std_radps = 0.02;
+  double max_accel_std_mps2 = 0.3;
+  double max_gyro_mean_radps = 0.1;
+  double gyro_bias_std_radps = 1e-3;
+  double accel_bias_std_mps2 = 0.05;
+  double gravity_std_mps2 = 0.005;
+
+  void fields(auto& f) {
+    f("window_s", window_s, "standstill that is averaged");
+    f("max_gyro_std_radps", max_gyro_std_radps, "a window that shakes more starts again");
+    f("max_accel_std_mps2", max_accel_std_mps2, "a window that shakes more starts again");
+    f("max_gyro_mean_radps", max_gyro_mean_radps, "a window that turns faster starts again");
+    f("gyro_bias_std_radps", gyro_bias_std_radps, "1 sigma of what the mean leaves unknown");
+    f("accel_bias_std_mps2", accel_bias_std_mps2,
+      "turn-on bias of the accelerometer, 1 sigma (ICM-42688-P: 20 mg at most)");
+    f("gravity_std_mps2", gravity_std_mps2,
+      "1 sigma of the standard gravity's magnitude: what latitude and height leave open after "
+      "scaling");
+    f.check(window_s > 0, "window_s > 0");
+    f.check(gyro_bias_std_radps > 0 && accel_bias_std_mps2 > 0 && gravity_std_mps2 > 0,
+            "initial deviations > 0");
+  }
+};
+
+/// How the LiDAR errs, as its datasheet and a measured unit say (reference.md, 2).
+struct LidarNoiseConfig {
+  double range_std_m = 0.0034;
+  double range_std_per_m = 0.00073;
+  double angle_std_rad = 1.745e-3;
+  double blind_m = 0.5;
+  double max_range_m = 60.0;
+
+  /// Variance along the beam, m^2.
+  [[nodiscard]] double range_variance(double range_m) const {
+    return range_std_m * range_std_m + range_std_per_m * range_std_per_m * range_m * range_m;
+  }
+  /// Variance across the beam, each axis, m^2.
+  [[nodiscard]] double lateral_variance(double range_m) const {
+    return angle_std_rad * angle_std_rad * range_m * range_m;
+  }
+
+  void fields(auto& f) {
+    f("range_std_m", range_std_m, "range noise at zero range (reference.md, 2)");
+    f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (reference.md, 2)");
+    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (reference.md, 2)");
+    f("blind_m", blind_m, "nearer returns are dropped (reference.md, 5)");
+    f("max_range_m", max_range_m, "further returns are dropped");
+    f.check(range_std_m > 0 && angle_std_rad > 0, "LiDAR noise > 0");
+    f.check(max_range_m > blind_m && blind_m >= 0, "max_range_m > blind_m >= 0");
+  }
+};
+
+/// The map that scans are matched against.
+struct SurfelMapConfig {
+  double finest_edge_m = 0.25;
+  int levels = 3;
+  int capacity = 250000;
+  int min_points = 6;
+  double saturation_weight = 100;
+  double max_thickness_ratio = 0.25;
+  double refresh_growth = 1.2;
+
+  void fields(auto& f) {
+    f("finest_edge_m", finest_edge_m, "edge of the finest cells; each level doubles it");
+    f("levels", levels, "resolutions");
+    f("capacity", capacity, "cells kept per level; the longest unseen make room");
+    f("min_points", min_points, "points that make a surfel");
+    f("saturation_weight", saturation_weight,
+      "a cell that holds this many points' worth of information at 1 cm noise takes no more");
+    f("max_thickness_ratio", max_thickness_ratio,
+      "a surfel thicker (1 sigma) than this share of its edge is no surface");
+    f("refresh_growth", refresh_growth, "a surfel is fitted anew when its points grew by this");
+    f.check(finest_edge_m > 0, "finest_edge_m > 0");
+    f.check(levels >= 1 && levels <= 4, "1 <= levels <= 4");
+    f.check(capacity >= 1000 && capacity <= 4000000, "1000 <= capacity <= 4000000");
+    f.check(min_points >= 4, "min_points >= 4");
+    f.check(refresh_growth >= 1, "refresh_growth >= 1");
+  }
+};
+
+/// Matching of one scan.
+struct RegistrationConfig {
+  double scan_voxel_m = 0.3;
+  int max_points = 2500;
+  int max_iterations = 4;
+  double converged_rad = 1e-4;
+  double converged_m = 1e-3;
+  double gate_sigma = 4.0;
+  double robust_sigma = 2.0;
+  double variance_inflation = 9.0;
+
+  void fields(auto& f) {
+    f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
+    f("max_points", max_points, "matched at most");
+    f("max_iterations", max_iterations, "of the iterated update (reference.md, 5)");
+    f("converged_rad", converged_rad, "a smaller step of attitude ends the iterations");
+    f("converged_m", converged_m, "a smaller step of position ends the iterations");
+    f("gate_sigma", gate_sigma, "residuals beyond this many sigma of their innovation are refused");
+    f("robust_sigma", robust_sigma, "scale of the Cauchy weight, in sigma");
+    f("variance_inflation", variance_inflation,
+      "on the residuals' variance: neighbours share their surfel's error");
+    f.check(scan_voxel_m > 0 && max_points > 0 && max_iterations > 0, "registration sizes > 0");
+    f.check(gate_sigma > 0 && robust_sigma > 0 && variance_inflation > 0,
+            "registration weights > 0");
+  }
+};
+
+/// When the estimate is called degenerate or lost, and how it is found again.
+struct OdometryHealthConfig {
+  int min_matches = 150;
+  double min_match_fraction = 0.25;
+  double degenerate_position_std_m = 0.02;
+  double degenerate_rotation_std_rad = 0.005;
+  double lost_position_std_m = 0.5;
+  double lost_rotation_std_rad = 0.2;
+  double degenerate_silence_s = 0.35;
+  double lost_silence_s = 3.0;
+  int lost_scans = 5;
+  int recovery_points = 300;
+  int recovery_yaw_steps = 36;
+  double recovery_radius_m = 2.0;
+  double recovery_step_m = 1.0;
+  double recovery_fraction = 0.5;
+  int recovery_confirmations = 3;
+
+  void fields(auto& f) {
+    f("min_matches", min_matches, "fewer matched points are no correction");
+    f("min_match_fraction", min_match_fraction, "a smaller share of the points is no correction");
+    f("degenerate_position_std_m", degenerate_position_std_m,
+      "worst direction of one scan's own information");
+    f("degenerate_rotation_std_rad", degenerate_rotation_std_rad,
+      "worst direction of one scan's own information");
+    f("lost_position_std_m", lost_position_std_m, "the filter's own doubt at which it is lost");
+    f("lost_rotation_std_rad", lost_rotation_std_rad, "the filter's own doubt at which it is lost");
+    f("degenerate_silence_s", degenerate_silence_s, "without a correction: degenerate");
+    f("lost_silence_s", lost_silence_s, "without a correction: lost");
+    f("lost_scans", lost_scans, "refused scans in a row: lost");
+    f("recovery_points", recovery_points, "of a scan scored at each guess of a recovery");
+    f("recovery_yaw_steps", recovery_yaw_steps, "guesses around the vertical");
+    f("recovery_radius_m", recovery_radius_m, "guesses reach this far to each side");
+    f("recovery_step_m", recovery_step_m, "spacing of the guesses");
+    f("recovery_fraction", recovery_fraction, "matched share that accepts a recovery");
+    f("recovery_confirmations", recovery_confirmations,
+      "good scans in a row before a found pose is called ok");
+    f.check(min_matches > 0 && lost_scans > 0, "health counts > 0");
+    f.check(recovery_step_m > 0 && recovery_yaw_steps > 0, "recovery steps > 0");
+  }
+};
+
+struct LidarInertialConfig {
+  ImuNoiseConfig imu;
+  StaticInitialiserConfig initialiser;
+  LidarNoiseConfig lidar;
+  SurfelMapConfig map;
+  RegistrationConfig registration;
+  OdometryHealthConfig health;
+  bool scale_accel = true;
+  bool estimate_extrinsics = false;
+  double extrinsic_rotation_std_rad = 0.02;
+  double extrinsic_position_std_m = 0.01;
+
+  void fields(auto& f) {
+    f("imu", imu, "noise of the IMU");
+    f("initialiser", initialiser, "standstill before take-off");
+    f("lidar", lidar, "noise of the LiDAR");
+    f("map", map, "surfel map");
+    f("registration", registration, "matching of a scan");
+    f("health", health, "when it is lost");
+    f("scale_accel", scale_accel,
+      "scale by G / |mean static a| (paper, II-B.2, with the magnitude kept)");
+    f("estimate_extrinsics", estimate_extrinsics, "X_BL is part of the state");
+    f("extrinsic_rotation_std_rad", extrinsic_rotation_std_rad,
+      "1 sigma of the mounting, each axis");
+    f("extrinsic_position_std_m", extrinsic_position_std_m, "1 sigma of the mounting, each axis");
+    f.check(extrinsic_rotation_std_rad > 0 && extrinsic_position_std_m > 0,
+            "extrinsic deviations > 0");
+  }
+};
+
+}  // namespace arex

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <vector>
+
+#include "messages/estimates.h"
+#include "messages/vehicle.h"
+#include "odometry/imu_predictor.h"
+#include "odometry/scan_corrector.h"
+
+namespace arex {
+
+/// Tightly coupled LiDAR-inertial odometry: an iterated error-state Kalman filter, corrected by
+/// scans at 10 Hz, carried on by every IMU sample at 200 Hz.
+///
+/// Frames: O gravity-aligned, origin at start-up; B body = IMU; L LiDAR.
+/// Source: Xu and Zhang, FAST-LIO, RA-L 2021; paper.tex eqs. (2)-(9).
+///
+/// A scan is handled in three steps, so that the heavy one may run elsewhere and its result be
+/// applied when the modelled latency is over:
+///
+///     ScanJob job = odometry.prepare(scan);         // at the scan's end; cheap
+///     ScanUpdate update = odometry.correct(job);    // heavy, any thread; beside add_imu()
+///     odometry.apply(update);                       // later; cheap
+///
+/// prepare() and apply() belong to the thread of add_imu(); every job prepared is corrected, in
+/// order.
+class LidarInertialOdometry {
+ public:
+  LidarInertialOdometry(const LidarInertialConfig& config, const VehicleConfig& vehicle);
+  LidarInertialOdometry(const LidarInertialConfig& config, const Pose& X_BL, double body_radius_m);
+
+  /// Propagates by one sample and returns the estimate at its stamp.
+  /// @pre imu.stamp is later than every stamp seen so far.
+  Odometry add_imu(const ImuSample& imu);
+
+  /// Hands the scan and the IMU samples since the last call to a job.
+  [[nodiscard]] ScanJob prepare(const LidarScanPtr& scan);
+  [[nodiscard]] ScanUpdate correct(const ScanJob& job) { return corrector_.correct(job); }
+  /// Anchors the output at the update and integrates the later samples again.
+  void apply(const ScanUpdate& update);
+
+  /// The three steps at once.
+  ScanUpdate add_scan(const LidarScanPtr& scan);
+
+  /// The newest estimate; kInitialising before the first scan update.
+  [[nodiscard]] const Odometry& odometry() const { return odometry_; }
+  [[nodiscard]] const SurfelMap& map() const { return corrector_.map(); }
+
+ private:
+  void publish(Stamp stamp, const std::optional<NavigationState>& state);
+
+  OdometryHealthConfig health_;
+  ScanCorrector corrector_;
+  ImuPredictor predictor_;
+  std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet
+  ImuSample newest_;
+  OdometryStatus scan_status_ = OdometryStatus::kInitialising;
+  Odometry odometry_;
+};
+
+}  // namespace arex

@@ -1,0 +1,145 @@
+#include "odometry/registration.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+
+#include "math/so3.h"
+
+namespace arex {
+namespace {
+
+struct Linearisation {
+  PoseInformation information;
+  int matched = 0;
+  double sum_squared_sigma = 0;
+};
+
+/// Sums the residuals of all points at the iterate `x`, in the order of the points.
+Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                        const LidarInertialConfig& config, const NavigationState& x,
+                        const PoseInformation::Matrix& P_pose) {
+  const RegistrationConfig& rc = config.registration;
+  const double gate2 = rc.gate_sigma * rc.gate_sigma;
+  const double robust2 = rc.robust_sigma * rc.robust_sigma;
+  const Pose X_OL = x.X_OB() * x.X_BL;
+  constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
+  Linearisation sum;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ScanPoint& point = points[i];
+    if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
+    const auto match = map.find(X_OL * point.p_L.cast<double>());
+    if (!match) continue;
+    const PlaneResidual residual = plane_residual(x, point, *match, config.lidar);
+    const double r2 = residual.r * residual.r;
+    const double pose_variance = residual.h.dot(P_pose * residual.h);
+    if (r2 > gate2 * (residual.variance_m2 + pose_variance)) continue;
+    ++sum.matched;
+    const double sigma2 = r2 / residual.variance_m2;
+    sum.sum_squared_sigma += sigma2;
+    const double weight =
+        1 / ((1 + sigma2 / robust2) * rc.variance_inflation * residual.variance_m2);
+    const PoseInformation::Vector weighted = weight * residual.h;
+    sum.information.A.noalias() += weighted * residual.h.transpose();
+    sum.information.b += residual.r * weighted;
+  }
+  return sum;
+}
+
+/// What is left of a block's information once the other block is unknown too, as deviations.
+void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec3& deviations,
+                      Vec3& worst_axis) {
+  constexpr double kLeastInformation = 1e-9;
+  const Mat3 regular = other + kLeastInformation * Mat3::Identity();
+  const Mat3 schur = own - cross * regular.inverse() * cross.transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (schur + schur.transpose()));
+  deviations =
+      solver.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse().cwiseSqrt().reverse();
+  worst_axis = solver.eigenvectors().col(0);
+}
+
+}  // namespace
+
+std::vector<ScanPoint> thin(const std::vector<ScanPoint>& points, double voxel_m, int max_points) {
+  // Open addressing over the cells met; a scan of 20,000 fills a third at most.
+  constexpr std::size_t kSlots = 1U << 16;
+  constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+  std::vector<std::uint64_t> slots(kSlots, kEmpty);
+  std::vector<ScanPoint> kept;
+  const float inverse = static_cast<float>(1 / voxel_m);
+  for (const ScanPoint& point : points) {
+    if (kept.size() >= kSlots / 2) break;
+    std::uint64_t key = 0;
+    for (int i = 0; i < 3; ++i) {
+      const auto c = static_cast<std::int64_t>(std::floor(point.p_L[i] * inverse)) + (1 << 20);
+      key = (key << 21) | (static_cast<std::uint64_t>(c) & 0x1fffffU);
+    }
+    std::size_t i = static_cast<std::size_t>((key * 0x9e3779b97f4a7c15ULL) >> 48);
+    while (slots[i] != kEmpty && slots[i] != key) i = (i + 1) & (kSlots - 1);
+    if (slots[i] == key) continue;
+    slots[i] = key;
+    kept.push_back(point);
+  }
+  const auto limit = static_cast<std::size_t>(max_points);
+  if (kept.size() <= limit) return kept;
+  std::vector<ScanPoint> thinned;
+  thinned.reserve(limit);
+  for (std::size_t i = 0; i < limit; ++i) thinned.push_back(kept[i * kept.size() / limit]);
+  return thinned;
+}
+
+PlaneResidual plane_residual(const NavigationState& x, const ScanPoint& point,
+                             const SurfelMatch& match, const LidarNoiseConfig& noise) {
+  const Vec3 p_L = point.p_L.cast<double>();
+  const Vec3 p_B = x.X_BL * p_L;
+  const Vec3 n_B = x.R_OB.transpose() * match.normal;
+  const Vec3 n_L = x.X_BL.R.transpose() * n_B;
+  PlaneResidual out;
+  out.r = match.normal.dot(x.R_OB * p_B + x.p_OB - match.mean);
+  out.h.segment<3>(0) = p_B.cross(n_B);  // -n^T R hat(p_B)
+  out.h.segment<3>(3) = match.normal;
+  out.h.segment<3>(6) = p_L.cross(n_L);
+  out.h.segment<3>(9) = n_B;
+  const double range = point.range_m;
+  const double along = n_L.dot(p_L) / p_L.norm();
+  const double along2 = along * along;
+  out.variance_m2 = match.variance_m2 + along2 * noise.range_variance(range) +
+                    (1 - along2) * noise.lateral_variance(range);
+  return out;
+}
+
+RegistrationReport register_scan(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                                 const LidarInertialConfig& config, ErrorStateFilter& filter) {
+  RegistrationReport report;
+  report.points = static_cast<int>(points.size());
+  const PoseInformation::Matrix P_pose = filter.pose_covariance();
+  NavigationState x = filter.state();
+  Linearisation at_x;
+  for (int i = 0; i < config.registration.max_iterations; ++i) {
+    at_x = linearise(points, map, config, x, P_pose);
+    ++report.iterations;
+    if (at_x.matched < config.health.min_matches) break;
+    const NavigationState next = filter.iterate(x, at_x.information);
+    const ErrorVector step = local(x, next);
+    x = next;
+    if (step.segment<3>(kRotation).norm() < config.registration.converged_rad &&
+        step.segment<3>(kPosition).norm() < config.registration.converged_m) {
+      break;
+    }
+  }
+  report.matched = at_x.matched;
+  if (at_x.matched > 0) {
+    report.residual_rms_sigma = std::sqrt(at_x.sum_squared_sigma / at_x.matched);
+    const PoseInformation::Matrix& A = at_x.information.A;
+    const Mat3 rr = A.block<3, 3>(0, 0), rp = A.block<3, 3>(0, 3), pp = A.block<3, 3>(3, 3);
+    block_deviations(pp, rp.transpose(), rr, report.position_std_m, report.worst_position_axis_O);
+    block_deviations(rr, rp, pp, report.rotation_std_rad, report.worst_rotation_axis_B);
+  }
+  report.accepted =
+      at_x.matched >= config.health.min_matches &&
+      at_x.matched >= config.health.min_match_fraction * static_cast<double>(points.size());
+  if (report.accepted) filter.finish(x, at_x.information);
+  return report;
+}
+
+}  // namespace arex

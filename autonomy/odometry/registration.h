@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "odometry/error_state_filter.h"
+#include "odometry/surfel_map.h"
+#include "odometry/undistortion.h"
+
+/// The iterated update of the filter by one undistorted scan: point to plane against the map.
+namespace arex {
+
+/// How one scan met the map.
+struct RegistrationReport {
+  int points = 0;   ///< asked of the map
+  int matched = 0;  ///< had a surfel and passed the gate, at the last iterate
+  int iterations = 0;
+  double residual_rms_sigma = 0;  ///< of the matched, in sigma
+  bool accepted = false;          ///< the filter was corrected
+  /// Standard deviation that this scan alone leaves in its worst and other directions, ascending.
+  Vec3 position_std_m = Vec3::Zero();
+  Vec3 rotation_std_rad = Vec3::Zero();
+  Vec3 worst_position_axis_O = Vec3::UnitZ();
+  Vec3 worst_rotation_axis_B = Vec3::UnitZ();
+};
+
+/// One point per cell of a grid in L, the first in firing order; thinned evenly to at most
+/// `max_points`.
+std::vector<ScanPoint> thin(const std::vector<ScanPoint>& points, double voxel_m, int max_points);
+
+/// Residual r = n . (p_O - mean), its derivative by [R_OB, p_OB, R_BL, p_BL] and its variance.
+struct PlaneResidual {
+  double r = 0;
+  PoseInformation::Vector h = PoseInformation::Vector::Zero();
+  double variance_m2 = 0;
+};
+PlaneResidual plane_residual(const NavigationState& x, const ScanPoint& point,
+                             const SurfelMatch& match, const LidarNoiseConfig& noise);
+
+/// Corrects `filter` with the points if enough of them match.
+RegistrationReport register_scan(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                                 const LidarInertialConfig& config, ErrorStateFilter& filter);
+
+}  // namespace arex

@@ -1,0 +1,99 @@
+#include "odometry/relocalisation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "math/so3.h"
+
+namespace arex {
+namespace {
+
+constexpr std::size_t kRefined = 6;       // best guesses that are refined
+constexpr int kRefinements = 6;           // updates of each
+constexpr double kScoredDistance = 0.3;   // a point this near its surfel counts, m
+constexpr double kDoubtedVelocity = 2.0;  // m/s
+
+struct Guess {
+  Pose X_OB;
+  int score = 0;
+};
+
+int score_of(const Pose& X_OL, const std::vector<Vec3>& sample_L, const SurfelMap& map) {
+  int score = 0;
+  for (const Vec3& p_L : sample_L) {
+    const Vec3 p_O = X_OL * p_L;
+    const auto match = map.find(p_O);
+    if (match && std::abs(match->normal.dot(p_O - match->mean)) < kScoredDistance) ++score;
+  }
+  return score;
+}
+
+std::vector<Vec3> sample(const std::vector<ScanPoint>& points, int count) {
+  std::vector<Vec3> out;
+  const auto n = std::min(points.size(), static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < n; ++i) {
+    out.push_back(points[i * points.size() / n].p_L.cast<double>());
+  }
+  return out;
+}
+
+/// All guesses, best first; equal scores keep the order of the search.
+std::vector<Guess> search(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                          const OdometryHealthConfig& hc, const NavigationState& state,
+                          const Vec3& centre) {
+  const std::vector<Vec3> sample_L = sample(points, hc.recovery_points);
+  const int reach = static_cast<int>(std::floor(hc.recovery_radius_m / hc.recovery_step_m));
+  std::vector<Guess> guesses;
+  for (int k = 0; k < hc.recovery_yaw_steps; ++k) {
+    const Mat3 turn = so3::from_yaw(2 * std::numbers::pi * k / hc.recovery_yaw_steps);
+    for (int i = -reach; i <= reach; ++i) {
+      for (int j = -reach; j <= reach; ++j) {
+        Guess guess;
+        guess.X_OB = {turn * state.R_OB, centre + hc.recovery_step_m * Vec3(i, j, 0)};
+        guess.score = score_of(guess.X_OB * state.X_BL, sample_L, map);
+        guesses.push_back(guess);
+      }
+    }
+  }
+  std::stable_sort(guesses.begin(), guesses.end(),
+                   [](const Guess& a, const Guess& b) { return a.score > b.score; });
+  return guesses;
+}
+
+}  // namespace
+
+std::optional<Relocalisation> relocalise(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                                         const LidarInertialConfig& config,
+                                         const NavigationState& state, const Vec3& last_position_O,
+                                         const ErrorMatrix& covariance) {
+  const OdometryHealthConfig& hc = config.health;
+  if (static_cast<int>(points.size()) < hc.min_matches) return std::nullopt;
+  const bool prediction_near = (state.p_OB - last_position_O).norm() < hc.recovery_radius_m;
+  std::vector<Guess> guesses =
+      search(points, map, hc, state, prediction_near ? state.p_OB : last_position_O);
+  guesses.resize(std::min(guesses.size(), kRefined));
+
+  std::optional<Relocalisation> best;
+  for (const Guess& guess : guesses) {
+    NavigationState x = state;
+    x.R_OB = guess.X_OB.R;
+    x.p_OB = guess.X_OB.p;
+    x.v_OB = Vec3::Zero();
+    ErrorStateFilter filter(config.imu);
+    filter.reset(x, covariance);
+    RegistrationReport report;
+    for (int i = 0; i < kRefinements; ++i) {
+      const double doubt = 1.0 / (1 << i);
+      filter.doubt_pose(0.5 * std::numbers::pi * doubt / hc.recovery_yaw_steps,
+                        hc.recovery_step_m * doubt, kDoubtedVelocity);
+      report = register_scan(points, map, config, filter);
+      if (!report.accepted) break;
+    }
+    if (!report.accepted || report.matched < hc.recovery_fraction * report.points) continue;
+    if (!best || report.matched > best->report.matched) best = Relocalisation{filter, report};
+  }
+  return best;
+}
+
+}  // namespace arex

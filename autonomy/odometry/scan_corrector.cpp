@@ -1,0 +1,162 @@
+#include "odometry/scan_corrector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "odometry/relocalisation.h"
+
+namespace arex {
+
+ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
+                             double body_radius_m)
+    : config_(config),
+      X_BL_(X_BL),
+      body_radius_m_(body_radius_m),
+      filter_(config.imu),
+      map_(config.map) {}
+
+ScanUpdate ScanCorrector::correct(const ScanJob& job) {
+  imu_.insert(imu_.end(), job.imu.begin(), job.imu.end());
+  ScanUpdate update;
+  update.stamp = job.scan->end;
+  if (status_ == OdometryStatus::kInitialising) {
+    try_start(job.scan);
+    update.points_O = std::make_shared<const std::vector<Vec3f>>();
+  } else {
+    const std::vector<MotionSegment> segments = predict_to(job.scan->end);
+    const std::vector<ScanPoint> points =
+        undistort(*job.scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
+    const std::vector<ScanPoint> thinned =
+        thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+    if (status_ == OdometryStatus::kLost) {
+      update.recovered = recover(thinned, update.registration);
+    } else {
+      update.registration = register_scan(thinned, map_, config_, filter_);
+    }
+    judge(update.registration);
+    std::vector<Vec3f> points_O;
+    if (update.registration.accepted && status_ != OdometryStatus::kLost) {
+      points_O = to_O(points);
+      if (confirmations_left_ == 0) insert(points, points_O);
+    }
+    update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
+  }
+  update.correction_stamp = correction_stamp_;
+  update.status = status_;
+  update.state = filter_.state();
+  update.covariance = filter_.covariance();
+  update.accel_scale = accel_scale_;
+  return update;
+}
+
+void ScanCorrector::try_start(const LidarScanPtr& scan) {
+  standing_scans_.push_back(scan);
+  const Stamp window_begin = scan->end - from_seconds(config_.initialiser.window_s);
+  std::erase_if(standing_scans_, [&](const LidarScanPtr& s) { return s->stamp < window_begin; });
+  const auto until = std::upper_bound(imu_.begin(), imu_.end(), scan->end,
+                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
+  const auto start = start_from_standstill({imu_.begin(), until}, X_BL_, config_);
+  if (!start) {
+    // One window and what a late scan may lack.
+    forget_imu_before(window_begin - from_seconds(0.2));
+    return;
+  }
+  filter_.reset(start->state, start->covariance);
+  accel_scale_ = start->accel_scale;
+  stamp_ = correction_stamp_ = scan->end;
+  corrected_position_ = filter_.state().p_OB;
+  status_ = OdometryStatus::kOk;
+  for (const LidarScanPtr& standing : standing_scans_) {
+    MotionSegment still;
+    still.begin = standing->stamp;
+    still.end = standing->end;
+    still.X_OB = filter_.state().X_OB();
+    const std::vector<ScanPoint> points =
+        undistort(*standing, {still}, X_BL_, config_.lidar, body_radius_m_);
+    insert(points, to_O(points));
+  }
+  standing_scans_.clear();
+  forget_imu_before(stamp_);
+}
+
+std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp) {
+  std::vector<MotionSegment> segments;
+  if (imu_.empty()) return segments;
+  for (const ImuInterval& imu : imu_intervals(imu_, stamp_, stamp, accel_scale_)) {
+    segments.push_back(motion_segment(filter_.state(), imu));
+    filter_.predict(imu);
+  }
+  stamp_ = stamp;
+  forget_imu_before(stamp);
+  return segments;
+}
+
+void ScanCorrector::judge(const RegistrationReport& report) {
+  const OdometryHealthConfig& hc = config_.health;
+  if (report.accepted) {
+    refused_in_a_row_ = 0;
+    correction_stamp_ = stamp_;
+    corrected_position_ = filter_.state().p_OB;
+    if (confirmations_left_ > 0) --confirmations_left_;
+  } else {
+    ++refused_in_a_row_;
+  }
+  const PoseInformation::Matrix P = filter_.pose_covariance();
+  const double rotation_std = std::sqrt(P.diagonal().segment<3>(0).maxCoeff());
+  const double position_std = std::sqrt(P.diagonal().segment<3>(3).maxCoeff());
+  const bool weak = report.position_std_m[0] > hc.degenerate_position_std_m ||
+                    report.rotation_std_rad[0] > hc.degenerate_rotation_std_rad;
+  if (refused_in_a_row_ >= hc.lost_scans || position_std > hc.lost_position_std_m ||
+      rotation_std > hc.lost_rotation_std_rad) {
+    status_ = OdometryStatus::kLost;
+  } else if (!report.accepted || weak || confirmations_left_ > 0) {
+    status_ = OdometryStatus::kDegenerate;
+  } else {
+    status_ = OdometryStatus::kOk;
+  }
+}
+
+bool ScanCorrector::recover(const std::vector<ScanPoint>& points, RegistrationReport& report) {
+  const auto found =
+      relocalise(points, map_, config_, filter_.state(), corrected_position_, filter_.covariance());
+  if (!found) {
+    report.points = static_cast<int>(points.size());
+    report.accepted = false;
+    return false;
+  }
+  filter_ = found->filter;
+  report = found->report;
+  refused_in_a_row_ = 0;
+  confirmations_left_ = config_.health.recovery_confirmations;
+  return true;
+}
+
+std::vector<Vec3f> ScanCorrector::to_O(const std::vector<ScanPoint>& points) const {
+  const Pose X_OL = filter_.state().X_OB() * filter_.state().X_BL;
+  std::vector<Vec3f> points_O;
+  points_O.reserve(points.size());
+  for (const ScanPoint& point : points) {
+    points_O.push_back((X_OL * point.p_L.cast<double>()).cast<float>());
+  }
+  return points_O;
+}
+
+void ScanCorrector::insert(const std::vector<ScanPoint>& points,
+                           const std::vector<Vec3f>& points_O) {
+  std::vector<float> variances;
+  variances.reserve(points.size());
+  for (const ScanPoint& point : points) {
+    const double range = point.range_m;
+    variances.push_back(static_cast<float>(config_.lidar.range_variance(range) +
+                                           config_.lidar.lateral_variance(range)));
+  }
+  map_.insert(points_O, variances);
+}
+
+void ScanCorrector::forget_imu_before(Stamp stamp) {
+  const auto after = std::upper_bound(imu_.begin(), imu_.end(), stamp,
+                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
+  if (after != imu_.begin()) imu_.erase(imu_.begin(), after - 1);
+}
+
+}  // namespace arex

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "messages/estimates.h"
+#include "messages/sensors.h"
+#include "odometry/registration.h"
+#include "odometry/static_initialiser.h"
+
+namespace arex {
+
+/// What a scan's correction reads of the rest: the scan and the IMU samples that came since the
+/// last job was made.
+struct ScanJob {
+  LidarScanPtr scan;
+  std::vector<ImuSample> imu;
+};
+
+using PointsPtr = std::shared_ptr<const std::vector<Vec3f>>;
+
+/// What came of one scan. Holds at `stamp`, the scan's end.
+struct ScanUpdate {
+  Stamp stamp = 0;
+  Stamp correction_stamp = 0;  ///< of the newest scan that corrected the state
+  OdometryStatus status = OdometryStatus::kInitialising;
+  NavigationState state;
+  ErrorMatrix covariance = ErrorMatrix::Zero();
+  double accel_scale = 1;
+  RegistrationReport registration;
+  bool recovered = false;  ///< the pose was found again on the map: it may have jumped
+  PointsPtr points_O;      ///< undistorted, in O, m; empty when the state is not to be trusted
+};
+
+/// The heavy half of the odometry: filter and map. Touches nothing but itself and its job, so that
+/// a job may run on any thread; jobs run one at a time, in the order of their scans.
+class ScanCorrector {
+ public:
+  ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL, double body_radius_m);
+
+  [[nodiscard]] ScanUpdate correct(const ScanJob& job);
+
+  [[nodiscard]] const SurfelMap& map() const { return map_; }
+
+ private:
+  void try_start(const LidarScanPtr& scan);
+  std::vector<MotionSegment> predict_to(Stamp stamp);
+  void judge(const RegistrationReport& report);
+  bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
+  void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
+  [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
+  void forget_imu_before(Stamp stamp);
+
+  LidarInertialConfig config_;
+  Pose X_BL_;
+  double body_radius_m_;
+  ErrorStateFilter filter_;
+  SurfelMap map_;
+  double accel_scale_ = 1;
+  std::vector<ImuSample> imu_;
+  std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
+  Stamp stamp_ = 0;                           ///< of the filter's state
+  Stamp correction_stamp_ = 0;
+  Vec3 corrected_position_ = Vec3::Zero();
+  OdometryStatus status_ = OdometryStatus::kInitialising;
+  int refused_in_a_row_ = 0;
+  int confirmations_left_ = 0;
+};
+
+}  // namespace arex

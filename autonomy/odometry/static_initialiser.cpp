@@ -1,0 +1,110 @@
+#include "odometry/static_initialiser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/so3.h"
+
+namespace arex {
+namespace {
+
+struct Moments {
+  Vec3 gyro_mean = Vec3::Zero(), accel_mean = Vec3::Zero();
+  double gyro_std = 0, accel_std = 0;  ///< the largest axis
+};
+
+Moments moments(std::span<const ImuSample> samples) {
+  Moments m;
+  const auto n = static_cast<double>(samples.size());
+  for (const ImuSample& s : samples) {
+    m.gyro_mean += s.gyro_radps / n;
+    m.accel_mean += s.accel_mps2 / n;
+  }
+  Vec3 gyro = Vec3::Zero(), accel = Vec3::Zero();
+  for (const ImuSample& s : samples) {
+    gyro += (s.gyro_radps - m.gyro_mean).cwiseAbs2() / n;
+    accel += (s.accel_mps2 - m.accel_mean).cwiseAbs2() / n;
+  }
+  m.gyro_std = std::sqrt(gyro.maxCoeff());
+  m.accel_std = std::sqrt(accel.maxCoeff());
+  return m;
+}
+
+ErrorMatrix prior_covariance(const LidarInertialConfig& config) {
+  const StaticInitialiserConfig& sc = config.initialiser;
+  // The start defines O; this only keeps the filter's algebra regular.
+  constexpr double kDefinedStd = 1e-5;
+  // Gravity before it is measured.
+  constexpr double kGravityPriorStd = 10.0;
+  ErrorMatrix P = ErrorMatrix::Zero();
+  const auto set = [&P](int block, double std) {
+    P.diagonal().segment<3>(block).setConstant(std * std);
+  };
+  set(kRotation, kDefinedStd);
+  set(kPosition, kDefinedStd);
+  set(kVelocity, kDefinedStd);
+  set(kGyroBias, sc.gyro_bias_std_radps);
+  set(kAccelBias, sc.accel_bias_std_mps2);
+  set(kGravityBlock, kGravityPriorStd);
+  if (config.estimate_extrinsics) {
+    set(kExtrinsicRotation, config.extrinsic_rotation_std_rad);
+    set(kExtrinsicPosition, config.extrinsic_position_std_m);
+  }
+  return P;
+}
+
+/// Roll and pitch that turn the specific force f_B to z; yaw zero.
+Mat3 level(const Vec3& f_B) {
+  const double roll = std::atan2(f_B.y(), f_B.z());
+  const double pitch = std::atan2(-f_B.x(), std::hypot(f_B.y(), f_B.z()));
+  return so3::Exp({0, pitch, 0}) * so3::Exp({roll, 0, 0});
+}
+
+}  // namespace
+
+std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samples,
+                                                 const Pose& X_BL,
+                                                 const LidarInertialConfig& config) {
+  const StaticInitialiserConfig& sc = config.initialiser;
+  if (samples.size() < 2) return std::nullopt;
+  const Stamp begin = samples.back().stamp - from_seconds(sc.window_s);
+  if (samples.front().stamp > begin) return std::nullopt;
+  const auto first = std::lower_bound(samples.begin(), samples.end(), begin,
+                                      [](const ImuSample& s, Stamp t) { return s.stamp < t; });
+  const std::span<const ImuSample> window(first, samples.end());
+  const Moments m = moments(window);
+  if (m.gyro_std > sc.max_gyro_std_radps || m.accel_std > sc.max_accel_std_mps2 ||
+      m.gyro_mean.norm() > sc.max_gyro_mean_radps || m.accel_mean.norm() < 0.5 * kGravity) {
+    return std::nullopt;
+  }
+
+  StaticStart start;
+  start.stamp = samples.back().stamp;
+  start.accel_scale = config.scale_accel ? kGravity / m.accel_mean.norm() : 1;
+  const Vec3 f_B = start.accel_scale * m.accel_mean;
+  NavigationState x;
+  x.R_OB = level(f_B);
+  x.b_g = m.gyro_mean;
+  x.X_BL = X_BL;
+  ErrorStateFilter filter(config.imu);
+  filter.reset(x, prior_covariance(config));
+
+  // At rest f_B = -R^T g + b_a.
+  Eigen::Matrix<double, 3, kErrorDim> H = Eigen::Matrix<double, 3, kErrorDim>::Zero();
+  H.block<3, 3>(0, kGravityBlock) = -x.R_OB.transpose();
+  H.block<3, 3>(0, kAccelBias) = Mat3::Identity();
+  const double mean_variance = m.accel_std * m.accel_std / static_cast<double>(window.size());
+  filter.correct<3>(f_B + x.R_OB.transpose() * x.g_O - x.b_a, H, mean_variance * Mat3::Identity());
+
+  // |g| = G.
+  Eigen::Matrix<double, 1, kErrorDim> h = Eigen::Matrix<double, 1, kErrorDim>::Zero();
+  const Vec3 g = filter.state().g_O;
+  h.block<1, 3>(0, kGravityBlock) = g.normalized().transpose();
+  filter.correct<1>(Eigen::Matrix<double, 1, 1>(kGravity - g.norm()), h,
+                    Eigen::Matrix<double, 1, 1>(std::pow(sc.gravity_std_mps2, 2)));
+  start.state = filter.state();
+  start.covariance = filter.covariance();
+  return start;
+}
+
+}  // namespace arex

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "odometry/error_state_filter.h"
+
+namespace arex {
+
+/// What standing still tells: where down is, what the gyro reads at rest, how the accelerometer is
+/// scaled.
+struct StaticStart {
+  Stamp stamp = 0;  ///< of the last sample used
+  NavigationState state;
+  ErrorMatrix covariance = ErrorMatrix::Zero();
+  double accel_scale = 1;  ///< G / |mean static a|
+};
+
+/// Averages a window of standstill. O is placed at B, its z axis against the mean specific force,
+/// B's heading as x: by definition without error. So what an accelerometer bias makes of "down" is
+/// doubt about gravity in O, and tied to the doubt about the bias: gravity and bias are conditioned
+/// on what was measured and on gravity's known magnitude.
+///
+/// @param samples the newest last; @returns nothing while they are too few or shake or turn.
+std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samples,
+                                                 const Pose& X_BL,
+                                                 const LidarInertialConfig& config);
+
+}  // namespace arex

@@ -1,0 +1,243 @@
+#include "odometry/surfel_map.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace arex {
+namespace {
+
+constexpr double kUnitVariance = 1e-4;  // weights are told in points of 1 cm noise
+constexpr double kPriorPoints = 3;      // of the points' own noise, in the thickness of a surfel
+constexpr int kCoordinateBits = 21;
+constexpr std::int64_t kCoordinateOffset = std::int64_t{1} << (kCoordinateBits - 1);
+
+/// The cell of p: three 21-bit coordinates side by side.
+std::uint64_t key_of(const Vec3& p, double inverse_edge) {
+  std::uint64_t key = 0;
+  for (int i = 0; i < 3; ++i) {
+    const auto c = static_cast<std::int64_t>(std::floor(p[i] * inverse_edge)) + kCoordinateOffset;
+    key = (key << kCoordinateBits) |
+          (static_cast<std::uint64_t>(c) & ((std::uint64_t{1} << kCoordinateBits) - 1));
+  }
+  return key;
+}
+
+Vec3 centre_of(const Vec3& p, double edge, double inverse_edge) {
+  return ((p * inverse_edge).array().floor() + 0.5).matrix() * edge;
+}
+
+std::size_t hash_of(std::uint64_t key) {  // SplitMix64's finaliser
+  key ^= key >> 30;
+  key *= 0xbf58476d1ce4e5b9ULL;
+  key ^= key >> 27;
+  key *= 0x94d049bb133111ebULL;
+  return static_cast<std::size_t>(key ^ (key >> 31));
+}
+
+Vec3 to_vec3(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
+
+Mat3 to_symmetric(const std::array<float, 6>& a) {
+  Mat3 m;
+  m << a[0], a[1], a[2], a[1], a[3], a[4], a[2], a[4], a[5];
+  return m;
+}
+
+}  // namespace
+
+SurfelMap::SurfelMap(const SurfelMapConfig& config) : config_(config) {
+  levels_.resize(static_cast<std::size_t>(config.levels));
+  for (int i = 0; i < config.levels; ++i) {
+    Level& level = levels_[static_cast<std::size_t>(i)];
+    level.edge_m = edge_m(i);
+    level.inverse_edge = 1 / level.edge_m;
+  }
+  clear();
+}
+
+void SurfelMap::clear() {
+  const auto capacity = static_cast<std::size_t>(config_.capacity);
+  std::size_t slots = 1;
+  while (slots < 2 * capacity) slots *= 2;
+  for (Level& level : levels_) {
+    level.slots.assign(slots, Slot{});
+    level.cells.assign(capacity, Cell{});
+    level.surfels.assign(capacity, Surfel{});
+    level.used = 0;
+    level.hand = 0;
+  }
+}
+
+std::size_t SurfelMap::slot_of(const Level& level, std::uint64_t key) {
+  const std::size_t mask = level.slots.size() - 1;
+  std::size_t i = hash_of(key) & mask;
+  while (level.slots[i].cell != kNone && level.slots[i].key != key) i = (i + 1) & mask;
+  return i;
+}
+
+void SurfelMap::erase_slot(Level& level, std::size_t hole) {
+  const std::size_t mask = level.slots.size() - 1;
+  // Close the gap: move up whatever may stand at the hole instead of further down.
+  for (std::size_t i = (hole + 1) & mask; level.slots[i].cell != kNone; i = (i + 1) & mask) {
+    const std::size_t home = hash_of(level.slots[i].key) & mask;
+    if (((i - home) & mask) >= ((i - hole) & mask)) {
+      level.slots[hole] = level.slots[i];
+      hole = i;
+    }
+  }
+  level.slots[hole] = Slot{};
+}
+
+std::uint32_t SurfelMap::make_room(Level& level) {
+  if (level.used < level.cells.size()) return static_cast<std::uint32_t>(level.used++);
+  for (;;) {
+    const std::size_t index = level.hand;
+    level.hand = (level.hand + 1) % level.cells.size();
+    const std::size_t slot = slot_of(level, level.cells[index].key);
+    if (level.slots[slot].seen == 0) {
+      erase_slot(level, slot);
+      return static_cast<std::uint32_t>(index);
+    }
+    level.slots[slot].seen = 0;
+  }
+}
+
+SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key) {
+  std::size_t i = slot_of(level, key);
+  if (level.slots[i].cell == kNone) {
+    const std::uint32_t index = make_room(level);
+    level.cells[index] = Cell{};
+    level.cells[index].key = key;
+    level.cells[index].refresh_at = config_.min_points;
+    level.surfels[index] = Surfel{};
+    i = slot_of(level, key);  // making room may have moved slots
+    level.slots[i] = {key, index, 0, 0};
+  }
+  level.slots[i].seen = 1;
+  return level.slots[i];
+}
+
+void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2) {
+  // Level by level and with the slots asked for ahead: the time goes into waiting for memory.
+  constexpr std::size_t kAhead = 16;
+  for (Level& level : levels_) {
+    const std::size_t mask = level.slots.size() - 1;
+    std::array<std::uint64_t, kAhead> keys{};
+    const auto look_ahead = [&](std::size_t i) {
+      keys[i % kAhead] = key_of(points_O[i].cast<double>(), level.inverse_edge);
+      __builtin_prefetch(&level.slots[hash_of(keys[i % kAhead]) & mask]);
+    };
+    for (std::size_t i = 0; i < std::min(kAhead, points_O.size()); ++i) look_ahead(i);
+    for (std::size_t i = 0; i < points_O.size(); ++i) {
+      Slot& slot = obtain(level, keys[i % kAhead]);
+      if (slot.saturated == 0) {
+        add(level, slot, points_O[i].cast<double>(),
+            static_cast<float>(kUnitVariance) / variances_m2[i]);
+      }
+      if (i + kAhead < points_O.size()) look_ahead(i + kAhead);
+    }
+  }
+}
+
+void SurfelMap::add(Level& level, Slot& slot, const Vec3& p_O, float weight) {
+  Cell& cell = level.cells[slot.cell];
+  const Vec3f d = (p_O - centre_of(p_O, level.edge_m, level.inverse_edge)).cast<float>();
+  ++cell.count;
+  cell.weight += weight;
+  for (int i = 0; i < 3; ++i) cell.first[static_cast<std::size_t>(i)] += weight * d[i];
+  cell.second[0] += weight * d.x() * d.x();
+  cell.second[1] += weight * d.x() * d.y();
+  cell.second[2] += weight * d.x() * d.z();
+  cell.second[3] += weight * d.y() * d.y();
+  cell.second[4] += weight * d.y() * d.z();
+  cell.second[5] += weight * d.z() * d.z();
+  if (cell.weight >= static_cast<float>(config_.saturation_weight)) slot.saturated = 1;
+  if (cell.count >= cell.refresh_at) {
+    refresh(level, cell, level.surfels[slot.cell]);
+    cell.refresh_at =
+        std::max(cell.count + 1, static_cast<int>(std::ceil(cell.count * config_.refresh_growth)));
+  }
+}
+
+void SurfelMap::prefetch(const Vec3& p_O) const {
+  for (const Level& level : levels_) {
+    const std::size_t mask = level.slots.size() - 1;
+    __builtin_prefetch(&level.slots[hash_of(key_of(p_O, level.inverse_edge)) & mask]);
+  }
+}
+
+SurfelMap::Fit SurfelMap::fit(int count, double weight, const Vec3& mean, const Mat3& covariance) {
+  Eigen::SelfAdjointEigenSolver<Mat3> solver;
+  solver.computeDirect(covariance);
+  const Vec3 spread = solver.eigenvalues().cwiseMax(0);
+  Fit fit;
+  fit.mean = mean;
+  fit.normal = solver.eigenvectors().col(0);
+  const double n = count;
+  const double noise = n / weight;  // harmonic mean of the points' variances
+  fit.thickness_m2 = (n * spread[0] + kPriorPoints * noise) / (n - 3 + kPriorPoints);
+  // Variance of a regression plane at mean + d: s^2 (1/n + d1^2 / (n l1) + d2^2 / (n l2)).
+  constexpr double kLeastSpread = 1e-6;
+  fit.regression = Mat3::Zero();
+  for (int i = 1; i < 3; ++i) {
+    const Vec3 axis = solver.eigenvectors().col(i);
+    fit.regression +=
+        fit.thickness_m2 / (n * std::max(spread[i], kLeastSpread)) * axis * axis.transpose();
+  }
+  return fit;
+}
+
+void SurfelMap::refresh(const Level& level, const Cell& cell, Surfel& surfel) const {
+  const double W = cell.weight;
+  const Vec3 mean = to_vec3(cell.first) / W;
+  const Mat3 covariance = to_symmetric(cell.second) / W - mean * mean.transpose();
+  const Fit f = fit(cell.count, W / kUnitVariance, mean, covariance);
+  const double limit = config_.max_thickness_ratio * level.edge_m;
+  surfel.thickness_m2 = -1;
+  if (f.thickness_m2 > limit * limit) return;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto e = static_cast<Eigen::Index>(i);
+    surfel.mean[i] = static_cast<float>(f.mean[e]);
+    surfel.normal[i] = static_cast<float>(f.normal[e]);
+  }
+  const Mat3& r = f.regression;
+  const std::array<double, 6> upper{r(0, 0), r(0, 1), r(0, 2), r(1, 1), r(1, 2), r(2, 2)};
+  for (std::size_t i = 0; i < 6; ++i) surfel.regression[i] = static_cast<float>(upper[i]);
+  surfel.thickness_m2 =
+      static_cast<float>(f.thickness_m2 * (1 + 1 / static_cast<double>(cell.count)));
+}
+
+std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
+  std::optional<SurfelMatch> best;
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    const Level& level = levels_[l];
+    const std::uint32_t index = level.slots[slot_of(level, key_of(p_O, level.inverse_edge))].cell;
+    if (index == kNone) continue;
+    const Surfel& surfel = level.surfels[index];
+    if (surfel.thickness_m2 < 0) continue;
+    const Vec3 mean = centre_of(p_O, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
+    const Vec3 d = p_O - mean;
+    const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
+    if (!best || variance < best->variance_m2) {
+      best = SurfelMatch{to_vec3(surfel.normal), mean, variance, static_cast<int>(l)};
+    }
+  }
+  return best;
+}
+
+bool SurfelMap::occupied(const Vec3& p_O) const {
+  const Level& level = levels_.back();
+  const std::uint32_t index = level.slots[slot_of(level, key_of(p_O, level.inverse_edge))].cell;
+  return index != kNone && level.surfels[index].thickness_m2 >= 0;
+}
+
+std::size_t SurfelMap::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const Level& level : levels_) {
+    bytes += level.slots.size() * sizeof(Slot) + level.cells.size() * sizeof(Cell) +
+             level.surfels.size() * sizeof(Surfel);
+  }
+  return bytes;
+}
+
+}  // namespace arex

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "odometry/lidar_inertial_config.h"
+
+namespace arex {
+
+/// Where a surface runs through a cell of the map, seen from one query point.
+struct SurfelMatch {
+  Vec3 normal = Vec3::UnitZ();  ///< unit, sign arbitrary
+  Vec3 mean = Vec3::Zero();     ///< of the surfel's points, in O, m
+  double variance_m2 = 0;  ///< of the surface's height along the normal at the query: thickness
+                           ///< and the fit's own doubt
+  int level = 0;           ///< 0: the finest
+};
+
+/// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell
+/// into it, and the plane fitted to them (a surfel). A query is answered by the resolution that is
+/// surest of its surface there: a wall by a large cell that averages hundreds of points, a trunk by
+/// the smallest. Memory is fixed: when a level is full the cells longest unseen make room (CLOCK).
+///
+/// Source: the moments are those of the normal-distributions transform (Biber and Strasser, 2003),
+/// the doubt of a fitted plane that of a linear regression, CLOCK is Corbato's, 1968.
+class SurfelMap {
+ public:
+  explicit SurfelMap(const SurfelMapConfig& config);
+
+  void clear();
+
+  /// Adds points, each with the variance of its position.
+  void insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2);
+
+  /// Asks the memory for what find(p_O) will read.
+  void prefetch(const Vec3& p_O) const;
+
+  /// The surfel with the least variance at p_O among the cells that hold p_O, if any has one.
+  [[nodiscard]] std::optional<SurfelMatch> find(const Vec3& p_O) const;
+
+  /// Whether some cell of the coarsest level that holds a surfel contains p_O.
+  [[nodiscard]] bool occupied(const Vec3& p_O) const;
+
+  [[nodiscard]] double edge_m(int level) const {
+    return config_.finest_edge_m * static_cast<double>(1 << level);
+  }
+  [[nodiscard]] std::size_t cells(int level) const {
+    return levels_[static_cast<std::size_t>(level)].used;
+  }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  /// What a cell says of its points: for the oracle in the tests.
+  struct Fit {
+    Vec3 mean, normal;
+    double thickness_m2 = 0;  ///< variance about the plane, with the prior of the points' own noise
+    Mat3 regression;          ///< d^T regression d: variance of the plane's height at mean + d
+  };
+  /// Fits a plane to moments: count, sum of weights w = 1/variance, weighted mean and covariance.
+  static Fit fit(int count, double weight, const Vec3& mean, const Mat3& covariance);
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+
+  /// Moments relative to the cell's centre, weights relative to 1 cm of noise. One cache line.
+  struct alignas(64) Cell {
+    std::uint64_t key = 0;
+    std::int32_t count = 0;
+    std::int32_t refresh_at = 0;
+    float weight = 0;
+    std::array<float, 3> first{};
+    std::array<float, 6> second{};
+  };
+  /// The fitted plane. One cache line.
+  struct alignas(64) Surfel {
+    std::array<float, 3> mean{};  ///< relative to the cell's centre
+    std::array<float, 3> normal{};
+    std::array<float, 6> regression{};
+    float thickness_m2 = -1;  ///< negative: no surfel
+  };
+  /// Four to a cache line; what most insertions end at, so that a saturated cell is not fetched.
+  struct Slot {
+    std::uint64_t key = 0;
+    std::uint32_t cell = kNone;
+    std::uint16_t seen = 0;  ///< CLOCK's reference bit
+    std::uint16_t saturated = 0;
+  };
+  struct Level {
+    double edge_m = 1;
+    double inverse_edge = 1;
+    std::vector<Slot> slots;  ///< open addressing, linear probing, power of two
+    std::vector<Cell> cells;
+    std::vector<Surfel> surfels;
+    std::size_t used = 0;
+    std::size_t hand = 0;  ///< CLOCK's
+  };
+
+  /// The slot that holds `key`, or the empty one where it would go.
+  static std::size_t slot_of(const Level& level, std::uint64_t key);
+  Slot& obtain(Level& level, std::uint64_t key);
+  static std::uint32_t make_room(Level& level);
+  static void erase_slot(Level& level, std::size_t hole);
+  void add(Level& level, Slot& slot, const Vec3& p_O, float weight);
+  void refresh(const Level& level, const Cell& cell, Surfel& surfel) const;
+
+  SurfelMapConfig config_;
+  std::vector<Level> levels_;
+};
+
+}  // namespace arex

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "odometry/lidar_inertial_config.h"
+#include "odometry/navigation_state.h"
+
+/// Backward propagation: every point of a scan as it would have been measured at the scan's end.
+/// Source: paper.tex eq. (4).
+namespace arex {
+
+/// The motion over one IMU interval: constant body rate, constant acceleration in O.
+struct MotionSegment {
+  Stamp begin = 0;
+  Stamp end = 0;
+  Pose X_OB;                   ///< at `begin`
+  Vec3 v_OB = Vec3::Zero();    ///< at `begin`, m/s
+  Vec3 w_OB_B = Vec3::Zero();  ///< rad/s, bias removed
+  Vec3 a_OB = Vec3::Zero();    ///< m/s^2, gravity included
+
+  [[nodiscard]] Pose pose_at(double since_begin_s) const;
+};
+
+/// The segment that propagate(x, imu) follows.
+MotionSegment motion_segment(const NavigationState& x, const ImuInterval& imu);
+
+/// A point in L at the scan's end.
+struct ScanPoint {
+  Vec3f p_L = Vec3f::Zero();
+  float range_m = 0;        ///< as measured
+  std::uint32_t index = 0;  ///< of the point in its scan
+};
+
+/// Undistorts a scan whose motion is covered by `segments` (in order, contiguous, ending at the
+/// scan's end); points before the first segment follow it backwards. Drops what is not the world:
+/// returns of the airframe (nearer to B than `body_radius_m`), in the blind zone, too far, not
+/// finite.
+std::vector<ScanPoint> undistort(const LidarScan& scan, const std::vector<MotionSegment>& segments,
+                                 const Pose& X_BL, const LidarNoiseConfig& config,
+                                 double body_radius_m);
+
+}  // namespace arex

@@ -15,7 +15,7 @@ find_program(CCACHE ccache)
 if(CCACHE)
   # ccache sees through precompiled headers only with these.
   set(CMAKE_CXX_COMPILER_LAUNCHER
-    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${CCACHE})
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()
 
 find_package(Eigen3 3.4 REQUIRED)

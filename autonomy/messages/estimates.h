@@ -28,6 +28,15 @@ struct AttitudeEstimate {
   Vec3 w_AB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
 };
 
+/// What the autopilot tells the stack, 200 Hz.
+struct AutopilotStatus {
+  AttitudeEstimate attitude;
+  bool ready = false;  ///< may be armed
+  bool armed = false;
+  bool follows = false;  ///< armed, and past its spin-up: tracks commands
+  bool landed = true;    ///< not in the air as far as it knows
+};
+
 /// Where the vehicle should be at one moment, in O.
 struct TrajectorySetpoint {
   Vec3 p_OB = Vec3::Zero();

@@ -20,13 +20,16 @@ JobQueue::JobQueue(int threads) {
   for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { run_worker(); });
 }
 
-JobQueue::~JobQueue() {
+JobQueue::~JobQueue() { stop(); }
+
+void JobQueue::stop() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   work_available_.notify_all();
   for (std::thread& worker : workers_) worker.join();
+  workers_.clear();
 }
 
 JobQueue::Lane JobQueue::add_lane(std::string name) {

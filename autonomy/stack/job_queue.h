@@ -34,6 +34,10 @@ class JobQueue {
   JobQueue(const JobQueue&) = delete;
   JobQueue& operator=(const JobQueue&) = delete;
 
+  /// Ends the host threads; jobs not begun are dropped. To be called before anything that jobs touch
+  /// goes away.
+  void stop();
+
   Lane add_lane(std::string name);
 
   /// Starts `work` at `now` or when the lane is free. @return the stamp at which it becomes

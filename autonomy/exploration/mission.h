@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "messages/estimates.h"
+#include "messages/events.h"
+
+namespace arex {
+
+/// What the vehicle is sent out to do. Positions are in O: origin where it stood at start-up, x its
+/// heading then, z up.
+struct MissionConfig {
+  enum class Kind { kWaypoints };
+  friend constexpr std::array<std::string_view, 1> enum_names(Kind) { return {"waypoints"}; }
+
+  Kind kind = Kind::kWaypoints;
+  std::vector<Vec3> waypoints_m;  ///< flown in order; the last is where it lands
+  double takeoff_height_m = 1.5;
+  double arrival_radius_m = 0.2;   ///< a waypoint counts as reached within this
+  double arrival_speed_mps = 0.2;  ///< and below this speed
+  double hold_s = 0.5;             ///< and for this long
+  double settle_s = 3.0;           ///< standing still before arming: sensors initialise
+  double max_time_s = 600;
+
+  void fields(auto& f) {
+    f("kind", kind, "what the vehicle is sent out to do");
+    f("waypoints_m", waypoints_m, "x, y, z in O, flown in order; it lands at the last");
+    f("takeoff_height_m", takeoff_height_m, "height of the first hover above the start");
+    f("arrival_radius_m", arrival_radius_m, "a waypoint counts as reached within this");
+    f("arrival_speed_mps", arrival_speed_mps, "and below this speed");
+    f("hold_s", hold_s, "and for this long");
+    f("settle_s", settle_s, "standing still before arming");
+    f("max_time_s", max_time_s, "the mission fails when it is not over by then");
+    f.check(takeoff_height_m > 0, "takeoff_height_m > 0");
+    f.check(arrival_radius_m > 0, "arrival_radius_m > 0");
+    f.check(arrival_speed_mps > 0, "arrival_speed_mps > 0");
+    f.check(hold_s >= 0, "hold_s >= 0");
+    f.check(settle_s >= 0, "settle_s >= 0");
+    f.check(max_time_s > 0, "max_time_s > 0");
+  }
+};
+
+/// What the mission asks of the vehicle's motion until it asks something else.
+struct MotionRequest {
+  enum class Kind {
+    kNone,     ///< motors off
+    kTakeoff,  ///< straight up to `goal`
+    kGoTo,     ///< to `goal`, along whatever path the motion side finds
+    kLand,     ///< straight down until touchdown
+  };
+  Kind kind = Kind::kNone;
+  Vec3 goal_O = Vec3::Zero();
+
+  bool operator==(const MotionRequest&) const = default;
+};
+
+/// The mission's states, in order.
+enum class MissionState { kInitialise, kTakeoff, kFly, kLand, kDone };
+inline constexpr std::array<std::string_view, 5> kMissionStateNames{"initialise", "takeoff", "fly",
+                                                                    "land", "done"};
+
+/// A target that was flown to.
+struct MissionTarget {
+  Vec3 p_O = Vec3::Zero();
+  Stamp reached = 0;
+};
+
+/// The mission: a state machine from arming to disarming, driven by the odometry and the
+/// autopilot's word. It knows where to go, not how.
+class Mission {
+ public:
+  using EventSink = std::function<void(EventKind, const std::string& detail)>;
+
+  Mission(const MissionConfig& config, EventSink events);
+
+  struct Inputs {
+    Stamp now = 0;
+    Odometry odometry;
+    bool autopilot_ready = false;  ///< its own attitude filter has settled
+    bool armed = false;
+  };
+  /// Advances by one control step.
+  MotionRequest update(const Inputs& inputs);
+
+  [[nodiscard]] MissionState state() const { return state_; }
+  [[nodiscard]] const std::vector<MissionTarget>& targets() const { return targets_; }
+
+ private:
+  void enter(MissionState state, const Inputs& inputs);
+  void select_waypoint(std::size_t index);
+  bool has_arrived(const Inputs& inputs);
+
+  MissionConfig config_;
+  EventSink events_;
+  MissionState state_ = MissionState::kInitialise;
+  MotionRequest request_;
+  std::size_t waypoint_ = 0;
+  Stamp inside_since_ = -1;  ///< when the vehicle came to rest within the goal's radius, -1: not
+  bool was_armed_ = false;
+  std::vector<MissionTarget> targets_;
+};
+
+}  // namespace arex

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "control/timed_path.h"
+#include "control/tracker.h"
+#include "exploration/mission.h"
+#include "messages/commands.h"
+#include "messages/estimates.h"
+#include "messages/events.h"
+#include "messages/sensors.h"
+#include "messages/vehicle.h"
+#include "stack/job_queue.h"
+
+namespace arex {
+
+struct OdometryConfig {
+  enum class Source { kMocap };
+  friend constexpr std::array<std::string_view, 1> enum_names(Source) { return {"mocap"}; }
+
+  Source source = Source::kMocap;
+
+  void fields(auto& f) {
+    f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
+  }
+};
+
+struct MappingConfig {
+  bool use_depth = true;
+  double depth_rate_hz = 10;
+
+  void fields(auto& f) {
+    f("use_depth", use_depth, "read the depth camera");
+    f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
+    f.check(depth_rate_hz > 0 && depth_rate_hz <= 30, "0 < depth_rate_hz <= 30");
+  }
+};
+
+/// Everything that can be set in the flight software, by module.
+struct StackConfig {
+  VehicleConfig vehicle;
+  OdometryConfig odometry;
+  MappingConfig mapping;
+  MissionConfig mission;
+  TimedPathConfig path;
+  TrackerConfig control;
+
+  void fields(auto& f) {
+    f("vehicle", vehicle, "what the stack believes of its vehicle");
+    f("odometry", odometry, "pose and velocity");
+    f("mapping", mapping, "maps of the surroundings");
+    f("mission", mission, "what to do");
+    f("path", path, "timed paths along straight legs");
+    f("control", control, "trajectory tracking");
+  }
+};
+
+/// The flight software on the companion computer, wired top to bottom:
+///
+///   IMU, LiDAR, depth, mocap -> odometry -> mission -> path -> tracker -> attitude and thrust
+///
+/// Fed by its caller with what the sensors deliver, in order of time; asked once a millisecond for
+/// a command. Heavy work goes through the job queue.
+class Stack {
+ public:
+  Stack(const StackConfig& config, JobQueue& jobs);
+
+  void add_imu(const ImuSample& imu);                 ///< 200 Hz
+  void add_autopilot(const AutopilotStatus& status);  ///< 200 Hz
+  void add_mocap(const MocapSample& mocap);
+  void add_scan(const LidarScanPtr& scan);  ///< 10 Hz
+  void add_depth(const DepthImagePtr& depth);
+  /// Whether the frame exposed at `stamp` will be read; the driver drops the others. To be asked once
+  /// for each frame.
+  [[nodiscard]] bool accepts_depth(Stamp stamp);
+
+  /// Runs what is due. @return the newest command when there is one, at 100 Hz.
+  std::optional<AttitudeCommand> tick(Stamp now);
+
+  [[nodiscard]] const Odometry& odometry() const { return odometry_; }
+  [[nodiscard]] const TrajectorySetpoint& setpoint() const { return setpoint_; }
+  [[nodiscard]] const Mission& mission() const { return mission_; }
+  /// What happened since the last call.
+  std::vector<Event> take_events();
+
+ private:
+  void plan_motion(const MotionRequest& request, Stamp now);
+  AttitudeCommand control(const MotionRequest& request, Stamp now);
+
+  StackConfig config_;
+  JobQueue& jobs_;
+  std::vector<Event> events_;
+  Stamp now_ = 0;
+
+  Odometry odometry_;
+  AutopilotStatus autopilot_;
+  Mission mission_;
+
+  MotionRequest motion_;  ///< the request that path_ serves
+  TimedPath path_;
+  Stamp path_start_ = -1;  ///< -1: not started
+  TrajectorySetpoint setpoint_;
+  Tracker tracker_;
+  Stamp control_period_;
+  Stamp next_control_ = 0;
+  Stamp next_depth_ = 0;
+  LidarScanPtr scan_;    ///< newest
+  DepthImagePtr depth_;  ///< newest
+};
+
+}  // namespace arex

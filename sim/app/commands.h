@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// The commands of `arex`, one function each. All return the process's exit code and throw
+/// ConfigError for bad input (main turns it into one line and exit code 2).
+namespace arex::app {
+
+/// What every command that reads a scenario takes.
+struct ScenarioArguments {
+  std::string file;
+  std::vector<std::string> overrides;  ///< --set key=value
+  std::optional<std::uint64_t> seed;   ///< --seed
+};
+
+struct RunArguments {
+  ScenarioArguments scenario;
+  std::string out;  ///< empty: runs/<scenario>-seed<seed>
+  int threads = 1;
+  bool quiet = false;
+};
+int run(const RunArguments& arguments);
+
+struct WorldArguments {
+  std::string file;  ///< a world recipe, or a scenario, whose `world` section is taken
+  std::vector<std::string> overrides;
+  std::optional<std::uint64_t> seed;
+  std::string out;
+};
+int world(const WorldArguments& arguments);
+
+struct PatternArguments {
+  std::string mode = "device";
+  int shots = 50'000;
+};
+int pattern(const PatternArguments& arguments);
+
+int params(const ScenarioArguments& arguments);
+int validate(const ScenarioArguments& arguments);
+
+}  // namespace arex::app

@@ -1,0 +1,85 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "app/commands.h"
+#include "config/config.h"
+
+namespace {
+
+using namespace arex::app;
+
+void add_scenario_options(CLI::App& command, ScenarioArguments& arguments, bool file_required) {
+  auto* file = command.add_option("scenario", arguments.file, "scenario file, scenarios/*.yaml");
+  if (file_required) file->required();
+  command.add_option("--set", arguments.overrides, "key=value over what the file says")
+      ->allow_extra_args(false);
+  command.add_option("--seed", arguments.seed, "the seed of everything random");
+}
+
+void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("run", "fly a scenario, write a scored run folder");
+  add_scenario_options(*command, arguments.scenario, true);
+  command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
+  command->add_option("--threads", arguments.threads, "host threads; the result does not change")
+      ->check(CLI::Range(1, 64));
+  command->add_flag("--quiet", arguments.quiet, "no progress line");
+  command->callback([&] { exit_code = run(arguments); });
+}
+
+void add_world(CLI::App& app, WorldArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("world", "write a world: mesh, MJCF, ground-truth map");
+  command->add_option("recipe", arguments.file, "world recipe, or a scenario")->required();
+  command->add_option("--set", arguments.overrides, "key=value over what the file says")
+      ->allow_extra_args(false);
+  command->add_option("--seed", arguments.seed, "the seed of the world");
+  command->add_option("--out", arguments.out, "folder to write")->required();
+  command->callback([&] { exit_code = world(arguments); });
+}
+
+void add_pattern(CLI::App& app, PatternArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("pattern", "print the MID-360's firing directions as CSV");
+  command->add_option("--mode", arguments.mode, "device or table")
+      ->check(CLI::IsMember({"device", "table"}));
+  command->add_option("--shots", arguments.shots, "shots to print; a shot is four firings")
+      ->check(CLI::PositiveNumber);
+  command->callback([&] { exit_code = pattern(arguments); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones"};
+  app.require_subcommand(1);
+  int exit_code = 0;
+  RunArguments run_arguments;
+  WorldArguments world_arguments;
+  PatternArguments pattern_arguments;
+  ScenarioArguments params_arguments;
+  ScenarioArguments validate_arguments;
+  add_run(app, run_arguments, exit_code);
+  add_world(app, world_arguments, exit_code);
+  add_pattern(app, pattern_arguments, exit_code);
+  auto* params_command = app.add_subcommand("params", "list every parameter");
+  add_scenario_options(*params_command, params_arguments, false);
+  params_command->callback([&] { exit_code = params(params_arguments); });
+  auto* validate_command = app.add_subcommand("validate", "check a scenario without flying it");
+  add_scenario_options(*validate_command, validate_arguments, true);
+  validate_command->callback([&] { exit_code = validate(validate_arguments); });
+
+  try {
+    app.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "arex: %s; see arex --help\n", error.what());
+    return 2;
+  } catch (const arex::ConfigError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "arex: %s\n", error.what());
+    return 1;
+  }
+}

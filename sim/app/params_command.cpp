@@ -1,0 +1,44 @@
+#include <algorithm>
+#include <cstdio>
+
+#include "app/commands.h"
+#include "run/scenario.h"
+
+namespace arex::app {
+namespace {
+
+sim::Scenario load(const ScenarioArguments& arguments) {
+  if (!arguments.file.empty()) {
+    return sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+  }
+  sim::Scenario defaults;
+  defaults.source = parse_yaml("", "defaults");
+  for (const std::string& assignment : arguments.overrides) {
+    apply_override(defaults.source, assignment);
+  }
+  read_config(defaults.source, defaults.config);
+  return defaults;
+}
+
+}  // namespace
+
+int params(const ScenarioArguments& arguments) {
+  const auto parameters = list_parameters(load(arguments).config);
+  std::size_t key_width = 0;
+  for (const ParameterInfo& p : parameters) key_width = std::max(key_width, p.key.size());
+  for (const ParameterInfo& p : parameters) {
+    std::printf("%-*s  %-18s  %-8s  %s\n", static_cast<int>(key_width), p.key.c_str(),
+                p.value.c_str(), p.unit.c_str(), p.meaning.c_str());
+  }
+  return 0;
+}
+
+int validate(const ScenarioArguments& arguments) {
+  const sim::Scenario scenario = load(arguments);
+  const worlds::World world = scenario.build_world();
+  std::printf("%s: valid; %zu objects, %zu triangles\n", arguments.file.c_str(),
+              world.objects.size(), world.mesh.triangles.size());
+  return 0;
+}
+
+}  // namespace arex::app

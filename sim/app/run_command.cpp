@@ -1,0 +1,110 @@
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "app/commands.h"
+#include "run/recorder.h"
+#include "run/scenario.h"
+#include "run/simulation.h"
+#include "run/summary.h"
+
+namespace arex::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::atomic<int> interrupt_signal{0};
+
+void on_signal(int signal) { interrupt_signal = signal; }
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// The line that a person watches.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool shown) : shown_(shown) {}
+  ~ProgressLine() {
+    if (drawn_) std::fputc('\n', stderr);
+  }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void update(const sim::Simulation& simulation) {
+    if (!shown_) return;
+    const double wall = seconds_since(begin_);
+    if (wall < next_) return;
+    next_ = wall + 0.25;
+    const double time = to_seconds(simulation.now());
+    const Mission& mission = simulation.stack().mission();
+    const auto state = kMissionStateNames[static_cast<std::size_t>(mission.state())];
+    std::fprintf(stderr, "\r%7.1f s  %-10.*s  targets %2zu  %5.2fx real time ", time,
+                 static_cast<int>(state.size()), state.data(), mission.targets().size(),
+                 time / wall);
+    drawn_ = true;
+  }
+
+ private:
+  bool shown_;
+  bool drawn_ = false;
+  double next_ = 0;
+  Clock::time_point begin_ = Clock::now();
+};
+
+std::filesystem::path run_folder(const RunArguments& arguments, const sim::Scenario& scenario) {
+  if (!arguments.out.empty()) return arguments.out;
+  return std::filesystem::path("runs") /
+         (scenario.name + "-seed" + std::to_string(scenario.config.seed));
+}
+
+void print_result(const sim::FlightResult& result, const std::filesystem::path& folder) {
+  const auto outcome = sim::kOutcomeNames[static_cast<std::size_t>(result.outcome)];
+  std::printf("%.*s (%s) after %.1f s and %.1f m, hash %s: %s\n", static_cast<int>(outcome.size()),
+              outcome.data(), result.reason.c_str(), to_seconds(result.duration), result.distance_m,
+              result.trajectory_hash.c_str(), folder.c_str());
+}
+
+int exit_code_of(sim::Outcome outcome) {
+  if (outcome == sim::Outcome::kSucceeded) return 0;
+  return outcome == sim::Outcome::kInterrupted ? 128 + SIGINT : 1;
+}
+
+}  // namespace
+
+int run(const RunArguments& arguments) {
+  const Clock::time_point begin = Clock::now();
+  const double cpu_begin = cpu_seconds();
+  const sim::Scenario scenario = sim::load_scenario(
+      arguments.scenario.file, arguments.scenario.overrides, arguments.scenario.seed);
+  const std::filesystem::path folder = run_folder(arguments, scenario);
+
+  // The world is built before the folder: a bad recipe writes nothing.
+  sim::Simulation simulation(scenario, arguments.threads);
+  sim::Recorder recorder(folder, scenario.resolved_yaml());
+  simulation.record_to(recorder);
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  {
+    ProgressLine progress(!arguments.quiet);
+    while (simulation.tick()) {
+      if (interrupt_signal != 0) simulation.interrupt("signal");
+      progress.update(simulation);
+    }
+  }
+  const sim::FlightResult result = simulation.finish();
+  recorder.write_file("timing.csv", sim::timing_csv(result.timing));
+  recorder.write_summary(
+      sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}));
+  if (!arguments.quiet) print_result(result, folder);
+  return exit_code_of(result.outcome);
+}
+
+}  // namespace arex::app

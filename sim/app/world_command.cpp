@@ -1,0 +1,54 @@
+#include <cstdio>
+
+#include "app/commands.h"
+#include "run/scenario.h"
+#include "worlds/export.h"
+#include "worlds/recipes.h"
+
+namespace arex::app {
+namespace {
+
+/// A world recipe on its own: the keys of a scenario's `world` section at the top of the file.
+struct RecipeConfig {
+  std::uint64_t seed = 1;
+  worlds::WorldConfig world;
+  worlds::ExportConfig exported;
+
+  void fields(auto& f) {
+    f("seed", seed, "of the world");
+    f("export", exported, "resolution and height band of the maps");
+    world.fields(f);
+  }
+};
+
+worlds::World build(const ConfigNode& root, const RecipeConfig& recipe) {
+  try {
+    return worlds::build_world(recipe.world, recipe.seed);
+  } catch (const ConfigError& error) {
+    throw ConfigError(root.where + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+int world(const WorldArguments& arguments) {
+  ConfigNode root = load_yaml(arguments.file);
+  for (const std::string& assignment : arguments.overrides) apply_override(root, assignment);
+  RecipeConfig recipe;
+  if (root.find("world")) {
+    const sim::Scenario scenario =
+        sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+    recipe.world = scenario.config.world;
+    recipe.seed = scenario.config.seed;
+  } else {
+    if (arguments.seed) apply_override(root, "seed=" + std::to_string(*arguments.seed));
+    read_config(root, recipe);
+  }
+  const worlds::World built = build(root, recipe);
+  worlds::export_world(built, recipe.exported, arguments.out);
+  std::printf("%s: %zu objects, %zu triangles, %zu collision shapes\n", arguments.out.c_str(),
+              built.objects.size(), built.mesh.triangles.size(), built.collision_shapes.size());
+  return 0;
+}
+
+}  // namespace arex::app

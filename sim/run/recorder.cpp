@@ -1,0 +1,114 @@
+#include "run/recorder.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+namespace arex::sim {
+namespace {
+
+// Every file of the contract: what an older run in the same folder may have left.
+constexpr const char* kContractFiles[] = {
+    "summary.json", "resolved.yaml", "truth.tum",  "estimate.tum",  "coverage.csv",
+    "events.csv",   "timing.csv",    "cloud.pcd",  "map.bt",        "map2d.pgm",
+    "map2d.yaml",   "report.html",   "flight.csv", "decisions.csv", "odometry_error.csv"};
+
+[[noreturn]] void fail(const std::filesystem::path& file) {
+  throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
+}
+
+void write_tum(std::FILE* file, Stamp stamp, const Pose& X) {
+  const Quat q = X.quaternion();
+  std::fprintf(file, "%.9f %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n", to_seconds(stamp), X.p.x(),
+               X.p.y(), X.p.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+std::string csv_quoted(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+}  // namespace
+
+Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_yaml)
+    : directory_(std::move(directory)),
+      truth_(nullptr, &std::fclose),
+      estimate_(nullptr, &std::fclose),
+      events_(nullptr, &std::fclose),
+      flight_(nullptr, &std::fclose) {
+  std::error_code error;
+  std::filesystem::create_directories(directory_, error);
+  if (error) throw std::runtime_error(directory_.string() + ": " + error.message());
+  for (const char* name : kContractFiles) std::filesystem::remove(directory_ / name, error);
+  write_file("resolved.yaml", resolved_yaml);
+  truth_ = open("truth.tum", "# time_s x_m y_m z_m qx qy qz qw (true X_OB)\n");
+  estimate_ = open("estimate.tum", "# time_s x_m y_m z_m qx qy qz qw (estimated X_OB)\n");
+  events_ = open("events.csv", "time_s,kind,detail\n");
+  flight_ = open("flight.csv",
+                 "time_s,speed_mps,tracking_error_m,odometry_error_m,clearance_m,height_m,"
+                 "battery_voltage_v,battery_power_w,battery_fraction\n");
+  flush();
+}
+
+Recorder::~Recorder() = default;
+
+Recorder::File Recorder::open(const char* name, const char* header) {
+  File file(std::fopen((directory_ / name).c_str(), "w"), &std::fclose);
+  if (!file) fail(directory_ / name);
+  std::fputs(header, file.get());
+  return file;
+}
+
+void Recorder::truth(Stamp stamp, const Pose& X_OB) { write_tum(truth_.get(), stamp, X_OB); }
+
+void Recorder::estimate(Stamp stamp, const Pose& X_OB) { write_tum(estimate_.get(), stamp, X_OB); }
+
+void Recorder::event(const Event& event) {
+  std::fprintf(events_.get(), "%.3f,%s,%s\n", to_seconds(event.stamp),
+               std::string(kEventKindNames[static_cast<std::size_t>(event.kind)]).c_str(),
+               csv_quoted(event.detail).c_str());
+}
+
+void Recorder::flight(const FlightRow& row) {
+  std::fprintf(flight_.get(), "%.3f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.1f,%.5f\n",
+               to_seconds(row.stamp), row.speed_mps, row.tracking_error_m, row.odometry_error_m,
+               row.clearance_m, row.height_m, row.battery_voltage_v, row.battery_power_w,
+               row.battery_fraction);
+}
+
+void Recorder::flush() {
+  check(truth_.get(), "truth.tum");
+  check(estimate_.get(), "estimate.tum");
+  check(events_.get(), "events.csv");
+  check(flight_.get(), "flight.csv");
+}
+
+void Recorder::check(std::FILE* file, const char* name) {
+  if (std::fflush(file) != 0 || std::ferror(file) != 0) fail(directory_ / name);
+}
+
+void Recorder::write_file(const std::string& name, const std::string& content) {
+  const std::filesystem::path final_path = directory_ / name;
+  const std::filesystem::path temporary = directory_ / (name + ".partial");
+  File file(std::fopen(temporary.c_str(), "w"), &std::fclose);
+  if (!file) fail(temporary);
+  const bool written =
+      std::fwrite(content.data(), 1, content.size(), file.get()) == content.size() &&
+      std::fflush(file.get()) == 0 && fsync(fileno(file.get())) == 0;
+  file.reset();
+  if (!written || std::rename(temporary.c_str(), final_path.c_str()) != 0) fail(final_path);
+}
+
+void Recorder::write_summary(const nlohmann::ordered_json& summary) {
+  flush();
+  write_file("summary.json", summary.dump(2) + "\n");
+}
+
+}  // namespace arex::sim

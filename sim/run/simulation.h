@@ -1,0 +1,127 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "autopilot/autopilot.h"
+#include "physics/physics.h"
+#include "run/recorder.h"
+#include "run/scenario.h"
+#include "run/stage_timer.h"
+#include "run/trajectory_hash.h"
+#include "scoring/clearance.h"
+#include "scoring/odometry_error.h"
+#include "sensors/scene.h"
+#include "stack/job_queue.h"
+
+namespace arex::sim {
+
+/// How a flight ended.
+enum class Outcome { kFlying, kSucceeded, kCollided, kStuck, kLost, kTimedOut, kInterrupted };
+inline constexpr std::array<std::string_view, 7> kOutcomeNames{
+    "flying", "succeeded", "collided", "stuck", "lost", "timed_out", "interrupted"};
+
+/// What a flight amounts to; summary.json comes from it.
+struct FlightResult {
+  Outcome outcome = Outcome::kFlying;
+  std::string reason;
+  Stamp duration = 0;
+  std::string trajectory_hash;  ///< of the true state at every tick and every command
+  std::string sensor_hash;      ///< of every scan and frame delivered
+  double distance_m = 0;
+  double tracking_rmse_m = 0;  ///< true position against the setpoint, take-off to landing
+  double landing_error_m = 0;  ///< horizontal, true resting place against the last target
+  int collisions = 0;
+  std::vector<MissionTarget> targets;
+  std::vector<double> target_miss_m;  ///< true distance from each target when it was reported
+  OdometryScore odometry;
+  double odometry_lost_s = 0;
+  ClearanceMeter::Statistics clearance;
+  BatteryState battery;
+  std::string renderer;  ///< of the depth frames; empty if none was read
+  std::vector<TimingRow> timing;
+};
+
+/// The vehicle in its world, in lockstep with its flight software: one integer clock, one thread of
+/// control, jobs whose results become visible at modelled times.
+class Simulation {
+ public:
+  /// Builds the world and everything in it. @throws ConfigError if the recipe gives no world.
+  /// @param threads host threads; the flight does not depend on them
+  Simulation(const Scenario& scenario, int threads);
+  ~Simulation();
+
+  /// Writes what happens from now on; `recorder` must outlive the flight.
+  void record_to(Recorder& recorder) { recorder_ = &recorder; }
+
+  /// Flies one millisecond. @return whether the flight goes on.
+  bool tick();
+  /// Ends the flight from outside.
+  void interrupt(const std::string& reason);
+
+  [[nodiscard]] Stamp now() const { return now_; }
+  [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
+  [[nodiscard]] const Stack& stack() const { return stack_; }
+  /// Scores what was flown. Call it once, at the end.
+  FlightResult finish();
+
+ private:
+  void fire_imu();
+  void fire_lidar();
+  void fire_depth();
+  void run_stack();
+  void run_autopilot();
+  void step_physics();
+  void record();
+  void score_tick();
+  void judge();
+  void end(Outcome outcome, const std::string& reason);
+  [[nodiscard]] Pose true_pose_in_O() const { return X_OW_ * physics_.truth().X_WB; }
+
+  struct Timers {
+    StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
+        recording{"recording"};
+  };
+
+  ScenarioConfig config_;
+  worlds::World world_;
+  Scene scene_;
+  Physics physics_;
+  Pose X_OW_;  ///< for scoring and the mocap oracle; the stack never sees it
+  ImuModel imu_;
+  Mid360 lidar_;
+  std::unique_ptr<D430> camera_;  ///< made when the first frame is read
+  Autopilot autopilot_;
+  Recorder* recorder_ = nullptr;
+
+  Stamp now_ = 0;
+  Outcome outcome_ = Outcome::kFlying;
+  std::string reason_;
+  MotorCommand motors_;
+  Truth previous_truth_;
+  std::vector<Truth> lidar_part_;           ///< ticks of the part being fired
+  std::shared_ptr<LidarScan> lidar_frame_;  ///< the frame being assembled
+  std::int64_t depth_frame_ = 0;            ///< index of the next frame
+
+  TrajectoryHash hash_;
+  TrajectoryHash sensor_hash_;
+  ClearanceMeter clearance_;
+  double last_clearance_m_ = 0;
+  std::vector<PosePair> pose_pairs_;
+  double odometry_error_m_ = 0;
+  double odometry_lost_s_ = 0;
+  double distance_m_ = 0;
+  double tracking_sum_ = 0;
+  std::size_t tracking_count_ = 0;
+  int collisions_ = 0;
+  std::vector<double> target_miss_m_;
+  Timers timers_;
+
+  JobQueue jobs_;
+  JobQueue::Lane lidar_lane_;
+  JobQueue::Lane depth_lane_;
+  Stack stack_;
+};
+
+}  // namespace arex::sim

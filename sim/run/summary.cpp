@@ -1,0 +1,90 @@
+#include "run/summary.h"
+
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#ifndef AREX_VERSION
+#error "AREX_VERSION comes from CMake"
+#endif
+
+namespace arex::sim {
+namespace {
+
+using nlohmann::ordered_json;
+
+// Numbers for people: six significant decimals are more than any of these hold.
+double rounded(double value) { return std::round(value * 1e6) / 1e6; }
+
+ordered_json targets_json(const FlightResult& result) {
+  ordered_json targets = ordered_json::array();
+  for (std::size_t i = 0; i < result.targets.size(); ++i) {
+    const MissionTarget& target = result.targets[i];
+    targets.push_back({{"x", rounded(target.p_O.x())},
+                       {"y", rounded(target.p_O.y())},
+                       {"z", rounded(target.p_O.z())},
+                       {"time_s", to_seconds(target.reached)},
+                       {"miss_m", rounded(result.target_miss_m[i])}});
+  }
+  return targets;
+}
+
+ordered_json odometry_json(const Scenario& scenario, const FlightResult& result) {
+  const auto source = scenario.config.stack.odometry.source;
+  const OdometryScore& score = result.odometry;
+  return {{"source", enum_names(source)[static_cast<std::size_t>(source)]},
+          {"ate_rmse_m", rounded(score.ate_rmse_m)},
+          {"ate_max_m", rounded(score.ate_max_m)},
+          {"ate_se3_rmse_m", rounded(score.ate_se3_rmse_m)},
+          {"yaw_error_max_deg", rounded(score.yaw_error_max_deg)},
+          {"rpe_1m_m", rounded(score.rpe_1m_m)},
+          {"rpe_10m_m", rounded(score.rpe_10m_m)},
+          {"lost_s", rounded(result.odometry_lost_s)}};
+}
+
+}  // namespace
+
+ordered_json summarise(const Scenario& scenario, const FlightResult& result, const HostTime& host) {
+  const double sim_time = to_seconds(result.duration);
+  ordered_json json;
+  json["outcome"] = kOutcomeNames[static_cast<std::size_t>(result.outcome)];
+  json["reason"] = result.reason;
+  json["scenario"] = scenario.name;
+  json["seed"] = scenario.config.seed;
+  json["sim_time_s"] = sim_time;
+  json["wall_time_s"] = rounded(host.wall_s);
+  json["cpu_time_s"] = rounded(host.cpu_s);
+  json["real_time_factor"] = rounded(sim_time / std::max(host.wall_s, 1e-9));
+  json["trajectory_hash"] = result.trajectory_hash;
+  json["sensor_hash"] = result.sensor_hash;
+  json["distance_m"] = rounded(result.distance_m);
+  json["targets"] = targets_json(result);
+  json["coverage"] = nullptr;
+  json["map"] = nullptr;
+  json["odometry"] = odometry_json(scenario, result);
+  json["planner"] = nullptr;
+  json["tracking"] = {{"rmse_m", rounded(result.tracking_rmse_m)},
+                      {"landing_error_m", rounded(result.landing_error_m)}};
+  json["clearance"] = {{"min_m", rounded(result.clearance.min_m)},
+                       {"p05_m", rounded(result.clearance.p05_m)}};
+  json["collisions"] = result.collisions;
+  json["battery"] = {{"used_wh", rounded(result.battery.used_wh)},
+                     {"remaining_fraction", rounded(result.battery.state_of_charge)}};
+  json["renderer"] =
+      result.renderer.empty() ? ordered_json(nullptr) : ordered_json(result.renderer);
+  json["build"] = {{"version", AREX_VERSION}, {"compiler", "g++ " __VERSION__}};
+  return json;
+}
+
+std::string timing_csv(const std::vector<TimingRow>& rows) {
+  std::string text = "module,calls,median_ms,p99_ms,total_s\n";
+  for (const TimingRow& row : rows) {
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%s,%zu,%.4f,%.4f,%.4f\n", row.module.c_str(),
+                  row.calls, row.median_ms, row.p99_ms, row.total_s);
+    text += line.data();
+  }
+  return text;
+}
+
+}  // namespace arex::sim

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "run/scenario.h"
+#include "run/simulation.h"
+
+namespace arex::sim {
+
+/// What the host spent on a run.
+struct HostTime {
+  double wall_s = 0;
+  double cpu_s = 0;
+};
+
+/// summary.json: the contract's names. Sections that this run has no module for are null.
+nlohmann::ordered_json summarise(const Scenario& scenario, const FlightResult& result,
+                                 const HostTime& host);
+
+/// timing.csv: module,calls,median_ms,p99_ms,total_s.
+std::string timing_csv(const std::vector<TimingRow>& rows);
+
+}  // namespace arex::sim

@@ -1,0 +1,176 @@
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "support/temporary_folder.h"
+
+// The contract of the command line, kept by the binary itself.
+namespace arex {
+namespace {
+
+using test::read_text;
+using test::TemporaryFolder;
+using test::write_text;
+
+constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
+
+struct Result {
+  int exit_code = -1;
+  std::string out;
+  std::string err;
+};
+
+/// The binary as a child of ours.
+class Process {
+ public:
+  Process(const std::vector<std::string>& arguments, const TemporaryFolder& folder)
+      : out_(folder / "stdout"), err_(folder / "stderr") {
+    pid_ = fork();
+    if (pid_ != 0) return;
+    dup2(creat(out_.c_str(), 0600), STDOUT_FILENO);
+    dup2(creat(err_.c_str(), 0600), STDERR_FILENO);
+    std::vector<char*> argv{const_cast<char*>(AREX_BINARY)};
+    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    argv.push_back(nullptr);
+    execv(AREX_BINARY, argv.data());
+    _exit(127);
+  }
+  void signal(int number) const { kill(pid_, number); }
+  Result wait() const {
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out_),
+            read_text(err_)};
+  }
+
+ private:
+  std::filesystem::path out_, err_;
+  pid_t pid_ = -1;
+};
+
+Result run(const std::vector<std::string>& arguments) {
+  const TemporaryFolder folder;
+  return Process(arguments, folder).wait();
+}
+
+void wait_for(const std::filesystem::path& file, std::size_t bytes) {
+  for (int i = 0; i < 1200; ++i) {
+    std::error_code ignored;
+    if (std::filesystem::exists(file, ignored) &&
+        std::filesystem::file_size(file, ignored) > bytes) {
+      return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  FAIL() << file << " did not grow";
+}
+
+// Exit code 2, one line that begins with the position, nothing written.
+void expect_refused(const std::string& yaml, const std::vector<std::string>& extra,
+                    const std::string& expected) {
+  const TemporaryFolder folder;
+  write_text(folder / "bad.yaml", yaml);
+  std::vector<std::string> arguments{"run", (folder / "bad.yaml").string(), "--quiet", "--out",
+                                     (folder / "out").string()};
+  arguments.insert(arguments.end(), extra.begin(), extra.end());
+  const Result result = run(arguments);
+  EXPECT_EQ(result.exit_code, 2) << yaml;
+  EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
+  expect_refused("seed: 1\nplan: 2\n", {}, "bad.yaml:2: unknown key 'plan'");
+  expect_refused("mission:\n  max_time_s: long\n", {}, "bad.yaml:2: 'max_time_s' is 'long'");
+  expect_refused("mission:\n  max_time_s: -1\n", {},
+                 "bad.yaml:2: out of range: expected max_time_s > 0");
+  expect_refused("mission:\n  max_time_s: .nan\n", {}, "bad.yaml:2: 'max_time_s' is '.nan'");
+  expect_refused("seed: 1\nseed: 2\n", {}, "bad.yaml:2: duplicate key 'seed'");
+  expect_refused("seed: 1\n", {"--set", "misson.max_time_s=1"}, "did you mean 'mission'?");
+  expect_refused("seed: 1\n", {"--set", "seed"}, "expected key=value");
+  expect_refused("seed: 1\n", {"--threads", "none"}, "--threads");
+  const Result missing = run({"run", "/does/not/exist.yaml"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_EQ(missing.err, "/does/not/exist.yaml:1: cannot be read, expected a YAML file\n");
+  EXPECT_EQ(run({"fly"}).exit_code, 2);
+  EXPECT_EQ(run({}).exit_code, 2);
+}
+
+TEST(CommandLine, ListsParametersAndValidatesScenarios) {
+  const Result params = run({"params", kWaypoints, "--set", "mission.max_time_s=77"});
+  EXPECT_EQ(params.exit_code, 0);
+  EXPECT_NE(params.out.find("mission.max_time_s"), std::string::npos);
+  EXPECT_NE(params.out.find("  77 "), std::string::npos);
+  EXPECT_EQ(run({"params"}).exit_code, 0);
+  EXPECT_EQ(run({"validate", kWaypoints}).exit_code, 0);
+  EXPECT_EQ(run({"--help"}).exit_code, 0);
+}
+
+TEST(CommandLine, PrintsThePatternOfTheDevice) {
+  const Result result = run({"pattern", "--mode", "table", "--shots", "100"});
+  EXPECT_EQ(result.exit_code, 0);
+  std::istringstream lines(result.out);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "time_s,line,azimuth_deg,elevation_deg");
+  int count = 0;
+  while (std::getline(lines, line)) ++count;
+  EXPECT_EQ(count, 400);
+  EXPECT_EQ(run({"pattern", "--mode", "other"}).exit_code, 2);
+}
+
+TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedForm) {
+  const TemporaryFolder folder;
+  const Result first = run({"run", kWaypoints, "--set", "mission.max_time_s=6", "--seed", "5",
+                            "--quiet", "--out", (folder / "a").string()});
+  EXPECT_EQ(first.exit_code, 1) << first.err;  // timed out
+  const auto summary = nlohmann::json::parse(read_text(folder / "a/summary.json"));
+  EXPECT_EQ(summary["outcome"], "timed_out");
+  EXPECT_EQ(summary["seed"], 5);
+  EXPECT_EQ(summary["scenario"], "waypoints");
+  EXPECT_DOUBLE_EQ(summary["sim_time_s"].get<double>(), 6.0);
+  for (const char* key : {"reason", "wall_time_s", "cpu_time_s", "real_time_factor",
+                          "trajectory_hash", "distance_m", "targets", "coverage", "map", "odometry",
+                          "planner", "clearance", "collisions", "battery", "build"}) {
+    EXPECT_TRUE(summary.contains(key)) << key;
+  }
+  for (const char* file :
+       {"resolved.yaml", "truth.tum", "estimate.tum", "events.csv", "timing.csv"}) {
+    EXPECT_GT(std::filesystem::file_size(folder / "a" / file), 0u) << file;
+  }
+  const Result again = run({"run", (folder / "a/resolved.yaml").string(), "--quiet", "--threads",
+                            "2", "--out", (folder / "b").string()});
+  EXPECT_EQ(again.exit_code, 1);
+  const auto summary_again = nlohmann::json::parse(read_text(folder / "b/summary.json"));
+  EXPECT_EQ(summary_again["trajectory_hash"], summary["trajectory_hash"]);
+  EXPECT_EQ(summary_again["sensor_hash"], summary["sensor_hash"]);
+}
+
+TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {
+  const TemporaryFolder folder;
+  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  wait_for(folder / "run/truth.tum", 100'000);
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait().exit_code, 130);
+  const auto summary = nlohmann::json::parse(read_text(folder / "run/summary.json"));
+  EXPECT_EQ(summary["outcome"], "interrupted");
+}
+
+TEST(CommandLine, AKilledRunLeavesNothingThatLooksFinished) {
+  const TemporaryFolder folder;
+  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  wait_for(folder / "run/truth.tum", 100'000);
+  process.signal(SIGKILL);
+  EXPECT_EQ(process.wait().exit_code, 128 + SIGKILL);
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/summary.json"));
+  EXPECT_NE(read_text(folder / "run/events.csv").find("mission_state"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace arex

@@ -1,0 +1,31 @@
+#include <gtest/gtest.h>
+
+#include "run/simulation.h"
+
+namespace arex::sim {
+namespace {
+
+FlightResult fly(std::uint64_t seed, int threads) {
+  const Scenario scenario =
+      load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", {"mission.max_time_s=8"}, seed);
+  Simulation simulation(scenario, threads);
+  while (simulation.tick()) {
+  }
+  return simulation.finish();
+}
+
+TEST(Determinism, ARunIsTheSameForAnyNumberOfThreadsAndOtherForAnotherSeed) {
+  const FlightResult reference = fly(1, 1);
+  EXPECT_GT(reference.distance_m, 1.5);  // it flies, LiDAR and depth running
+  for (const int threads : {1, 2, 4}) {
+    const FlightResult again = fly(1, threads);
+    EXPECT_EQ(again.trajectory_hash, reference.trajectory_hash) << threads << " threads";
+    EXPECT_EQ(again.sensor_hash, reference.sensor_hash) << threads << " threads";
+  }
+  const FlightResult other = fly(2, 2);
+  EXPECT_NE(other.trajectory_hash, reference.trajectory_hash);
+  EXPECT_NE(other.sensor_hash, reference.sensor_hash);
+}
+
+}  // namespace
+}  // namespace arex::sim

@@ -1,0 +1,67 @@
+#include "run/scenario.h"
+
+#include <gtest/gtest.h>
+
+#include "support/temporary_folder.h"
+
+namespace arex::sim {
+namespace {
+
+using test::TemporaryFolder;
+using test::write_text;
+
+std::vector<std::filesystem::path> shipped_scenarios() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios")) {
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+TEST(Scenario, EveryShippedFileIsValidAndSurvivesItsResolvedForm) {
+  ASSERT_FALSE(shipped_scenarios().empty());
+  const TemporaryFolder folder;
+  for (const auto& file : shipped_scenarios()) {
+    const Scenario scenario = load_scenario(file, {}, 7);
+    write_text(folder / "resolved.yaml", scenario.resolved_yaml());
+    const Scenario again = load_scenario(folder / "resolved.yaml", {}, {});
+    EXPECT_EQ(again.resolved_yaml(), scenario.resolved_yaml()) << file;
+    EXPECT_EQ(again.config.seed, 7u);
+  }
+}
+
+TEST(Scenario, EveryParameterSaysWhatItMeans) {
+  for (const ParameterInfo& p : list_parameters(ScenarioConfig{})) {
+    EXPECT_FALSE(p.meaning.empty()) << p.key;
+  }
+}
+
+TEST(Scenario, HasTheKeysThatOthersRelyOn) {
+  const auto parameters = list_parameters(ScenarioConfig{});
+  for (const char* key : {"seed", "odometry.source", "mission.max_time_s", "mapping.use_depth"}) {
+    EXPECT_TRUE(std::any_of(parameters.begin(), parameters.end(), [&](const auto& p) {
+      return p.key == key;
+    })) << key;
+  }
+}
+
+TEST(Scenario, ARecipeWithoutAFreeStartIsAnErrorAtItsLine) {
+  const TemporaryFolder folder;
+  write_text(folder / "bad.yaml",
+             "seed: 3\nworld:\n  kind: forest\n  vehicle_radius_m: 2\n  forest:\n"
+             "    start_radius_m: 0.5\n    tree_density_per_m2: 0.19\n");
+  const Scenario scenario = load_scenario(folder / "bad.yaml", {}, {});
+  try {
+    scenario.build_world();
+    FAIL() << "no error";
+  } catch (const ConfigError& error) {
+    const std::string what = error.what();
+    EXPECT_EQ(what.find((folder / "bad.yaml").string() + ":"), 0u) << what;
+    EXPECT_NE(what.find("free start"), std::string::npos) << what;
+    EXPECT_EQ(what.find('\n'), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace arex::sim

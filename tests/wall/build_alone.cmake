@@ -1,0 +1,6 @@
+foreach(arguments "-S;${SOURCE};-B;${BUILD};-G;Ninja" "--build;${BUILD}")
+  execute_process(COMMAND ${CMAKE_COMMAND} ${arguments} RESULT_VARIABLE result)
+  if(result)
+    message(FATAL_ERROR "cmake ${arguments} failed")
+  endif()
+endforeach()

@@ -1,6 +1,8 @@
 #include "sensors/renderer_culling.h"
 
 #include <algorithm>
+#include <array>
+#include <compare>
 #include <numeric>
 #include <utility>
 
@@ -36,6 +38,55 @@ std::uint32_t morton_code(const Vec3f& p, const Eigen::AlignedBox3f& bounds) {
          spread(static_cast<std::uint32_t>(cell.z())) << 2U;
 }
 
+/// Triangles that hang together by shared vertices, each such surface named by one of its vertices.
+class Surfaces {
+ public:
+  explicit Surfaces(const worlds::Mesh& mesh)
+      : parent_(mesh.vertices.size()), triangle_count_(mesh.vertices.size(), 0) {
+    std::iota(parent_.begin(), parent_.end(), 0U);
+    for (const auto& [a, b, c] : mesh.triangles) {
+      parent_[find(b)] = find(a);
+      parent_[find(c)] = find(a);
+    }
+    for (std::uint32_t vertex = 0; vertex < parent_.size(); ++vertex)
+      parent_[vertex] = find(vertex);
+    for (const auto& triangle : mesh.triangles) ++triangle_count_[of(triangle[0])];
+  }
+  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) const { return parent_[vertex]; }
+  [[nodiscard]] std::uint32_t triangle_count(std::uint32_t vertex) const {
+    return triangle_count_[of(vertex)];
+  }
+
+ private:
+  std::uint32_t find(std::uint32_t vertex) {
+    while (parent_[vertex] != vertex) vertex = parent_[vertex] = parent_[parent_[vertex]];
+    return vertex;
+  }
+  std::vector<std::uint32_t> parent_, triangle_count_;
+};
+
+/// One triangle's run along an edge, from its lower to its higher vertex or back.
+struct EdgeSide {
+  std::uint64_t edge;
+  std::uint32_t triangle;
+  bool forward;
+  auto operator<=>(const EdgeSide&) const = default;
+};
+
+struct Neighbour {
+  std::uint32_t triangle = 0;
+  bool flipped = false;
+};
+
+/// Six times the volume between a triangle and `apex`, positive if counter-clockwise from beyond.
+double signed_volume(const worlds::Mesh& mesh, std::uint32_t triangle, const Vec3f& apex) {
+  const auto& [a, b, c] = mesh.triangles[triangle];
+  const Vec3 p = (mesh.vertices[a] - apex).cast<double>();
+  const Vec3 q = (mesh.vertices[b] - apex).cast<double>();
+  const Vec3 r = (mesh.vertices[c] - apex).cast<double>();
+  return p.dot(q.cross(r));
+}
+
 }  // namespace
 
 ViewVolume::ViewVolume(const PinholeCamera& camera, const Pose& X_WC, double far_m) {
@@ -67,51 +118,60 @@ double ViewVolume::nearest_depth(const Eigen::AlignedBox3f& box) const {
 }
 
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh) {
-  // Surfaces: vertices joined by triangles, each named by one of its vertices.
-  std::vector<std::uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto surface_of = [&parent](std::uint32_t vertex) {
-    while (parent[vertex] != vertex) vertex = parent[vertex] = parent[parent[vertex]];
-    return vertex;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    parent[surface_of(b)] = surface_of(a);
-    parent[surface_of(c)] = surface_of(a);
-  }
-  std::vector<std::uint32_t> triangle_count(mesh.vertices.size(), 0);
-  for (const auto& triangle : mesh.triangles) ++triangle_count[surface_of(triangle[0])];
-
-  // Six times the volume of each surface, and its edges with the direction in the lowest bit.
-  std::vector<double> volume(mesh.vertices.size(), 0);
-  std::vector<std::uint64_t> edges;
-  constexpr std::uint32_t kFewestOfASolid = 4;
-  for (const auto& triangle : mesh.triangles) {
-    const std::uint32_t surface = surface_of(triangle[0]);
-    if (triangle_count[surface] < kFewestOfASolid) continue;
-    const Vec3f& origin = mesh.vertices[surface];
-    const Vec3 a = (mesh.vertices[triangle[0]] - origin).cast<double>();
-    const Vec3 b = (mesh.vertices[triangle[1]] - origin).cast<double>();
-    const Vec3 c = (mesh.vertices[triangle[2]] - origin).cast<double>();
-    volume[surface] += a.dot(b.cross(c));
+  const Surfaces surfaces(mesh);
+  std::vector<EdgeSide> sides;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    constexpr std::uint32_t kFewestOfASolid = 4;
+    if (surfaces.triangle_count(mesh.triangles[t][0]) < kFewestOfASolid) continue;
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint64_t from = triangle[k], to = triangle[(k + 1) % 3];
-      edges.push_back(std::min(from, to) << 33U | std::max(from, to) << 1U | (from < to ? 1U : 0U));
+      const std::uint64_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
+      sides.push_back({std::min(from, to) << 32U | std::max(from, to), t, from < to});
     }
   }
-  std::sort(edges.begin(), edges.end());
+  std::sort(sides.begin(), sides.end());
+  // Two triangles that run along their edge in the same direction are wound differently.
   std::vector<bool> open(mesh.vertices.size(), false);
-  for (std::size_t i = 0; i < edges.size();) {
+  std::vector<std::array<Neighbour, 3>> neighbours(mesh.triangles.size());
+  std::vector<std::uint8_t> filled(mesh.triangles.size(), 0);
+  for (std::size_t i = 0; i < sides.size();) {
     std::size_t end = i + 1;
-    while (end < edges.size() && edges[end] >> 1U == edges[i] >> 1U) ++end;
-    const bool matched = end - i == 2 && edges[i] != edges[i + 1];
-    if (!matched) open[surface_of(static_cast<std::uint32_t>(edges[i] >> 33U))] = true;
+    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
+    const EdgeSide& a = sides[i];
+    const EdgeSide& b = sides[end - 1];
+    if (end - i == 2) {
+      const bool flipped = a.forward == b.forward;
+      neighbours[a.triangle][filled[a.triangle]++] = {b.triangle, flipped};
+      neighbours[b.triangle][filled[b.triangle]++] = {a.triangle, flipped};
+    } else {
+      open[surfaces.of(mesh.triangles[a.triangle][0])] = true;
+    }
     i = end;
   }
+  // Carry one triangle's winding over its surface; the sign of the volume tells in from out.
   std::vector<std::int8_t> winding(mesh.triangles.size(), 0);
-  for (std::size_t t = 0; t < winding.size(); ++t) {
-    const std::uint32_t surface = surface_of(mesh.triangles[t][0]);
-    if (open[surface] || volume[surface] == 0) continue;
-    winding[t] = volume[surface] > 0 ? 1 : -1;
+  std::vector<std::uint32_t> reached;
+  for (std::uint32_t seed = 0; seed < winding.size(); ++seed) {
+    const std::uint32_t surface = surfaces.of(mesh.triangles[seed][0]);
+    if (winding[seed] != 0 || filled[seed] != 3 || open[surface]) continue;
+    reached.assign(1, seed);
+    winding[seed] = 1;
+    double volume = 0;
+    bool orientable = true;
+    for (std::size_t i = 0; i < reached.size(); ++i) {
+      const std::uint32_t t = reached[i];
+      volume += winding[t] * signed_volume(mesh, t, mesh.vertices[surface]);
+      for (const Neighbour& next : neighbours[t]) {
+        const auto expected = static_cast<std::int8_t>(next.flipped ? -winding[t] : winding[t]);
+        if (winding[next.triangle] == 0) {
+          winding[next.triangle] = expected;
+          reached.push_back(next.triangle);
+        }
+        orientable = orientable && winding[next.triangle] == expected;
+      }
+    }
+    const int sign = !orientable || volume == 0 ? 0 : volume > 0 ? 1 : -1;
+    for (const std::uint32_t t : reached) winding[t] = static_cast<std::int8_t>(winding[t] * sign);
+    if (sign == 0) open[surface] = true;
   }
   return winding;
 }

@@ -31,8 +31,8 @@ class ViewVolume {
 
 /// For each triangle: +1 if it belongs to a closed surface and its corners run counter-clockwise
 /// seen from outside, -1 if clockwise, 0 if its surface is open (a leaf, the terrain). A surface is
-/// what hangs together by shared vertices; it is closed if each of its edges is run through exactly
-/// once in either direction.
+/// what hangs together by shared vertices; it is closed if each of its edges bounds exactly two
+/// triangles and it has an inside. The mesh's own winding does not matter.
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh);
 
 /// A mesh cut finer than its chunks, for culling: a view touches the clusters it needs and few

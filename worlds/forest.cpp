@@ -100,7 +100,7 @@ bool free_for_undergrowth(const ForestRecipe& recipe, const Vec2& p, double reac
 }
 
 void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const HeightField& terrain,
-                     std::uint64_t seed) {
+                     const std::vector<TreeSite>& trees, std::uint64_t seed) {
   const UndergrowthRecipe& plants = recipe.undergrowth;
   const Vec2 extent = recipe.size_m - 2 * Vec2::Constant(recipe.edge_m);
   const auto ground = [&](const Vec2& p) { return Vec3(p.x(), p.y(), terrain.at(p.x(), p.y())); };
@@ -130,8 +130,11 @@ void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const Hei
     const Vec2 along = 0.5 * length * direction(heading, 0).head<2>();
     const bool inside =
         ((p.cwiseAbs() + along.cwiseAbs()).array() < 0.5 * recipe.size_m.array()).all();
-    if (inside && free_for_undergrowth(recipe, p - along, radius) &&
-        free_for_undergrowth(recipe, p, 0.5 * length)) {
+    const double gap = recipe.tree.trunk_radius_max_m + radius;  // logs fall between the trees
+    const bool between = std::none_of(trees.begin(), trees.end(), [&](const TreeSite& tree) {
+      return distance_to_segment(tree.position, p - along, p + along) < gap;
+    });
+    if (inside && between && free_for_undergrowth(recipe, p, 0.5 * length + kMaxStubLength)) {
       add_log(builder, terrain, p, heading, length, radius, r);
     }
   });
@@ -172,11 +175,12 @@ World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
     return p.z() - terrain.at(p.x(), p.y()) > kClearHeight || !is_cleared(recipe, xy, 0);
   };
   const RandomStream tree_stream(seed, "worlds/forest/tree");
-  for (const auto& [p, index] : place_trees(recipe, seed)) {
+  const std::vector<TreeSite> sites = place_trees(recipe, seed);
+  for (const auto& [p, index] : sites) {
     add_tree(builder, recipe.tree, {p.x(), p.y(), terrain.at(p.x(), p.y())}, allowed,
              tree_stream.fork(index));
   }
-  add_undergrowth(builder, recipe, terrain, seed);
+  add_undergrowth(builder, recipe, terrain, sites, seed);
 
   World world = builder.finish();
   world.bounds.low.head<2>() = terrain.origin;

@@ -38,7 +38,7 @@ struct UndergrowthRecipe {
   int shrub_leaves = 110;
   double fern_density_per_m2 = 0.10;
   double fern_length_m = 0.55;
-  double log_density_per_m2 = 0.008;
+  double log_density_per_m2 = 0.012;
   double log_length_m = 4.0;
   double log_radius_m = 0.13;
 
@@ -48,7 +48,8 @@ struct UndergrowthRecipe {
     f("shrub_leaves", shrub_leaves, "leaf quads of a shrub of mean height");
     f("fern_density_per_m2", fern_density_per_m2, "ferns: fronds only, nothing to collide with");
     f("fern_length_m", fern_length_m, "mean length of a frond");
-    f("log_density_per_m2", log_density_per_m2, "fallen logs");
+    f("log_density_per_m2", log_density_per_m2,
+      "fallen logs; those that would lie across a trunk are left out");
     f("log_length_m", log_length_m, "their mean length");
     f("log_radius_m", log_radius_m, "their mean radius");
     f.check(shrub_density_per_m2 >= 0 && shrub_density_per_m2 <= 2,

@@ -104,7 +104,7 @@ void add_log(MeshBuilder& builder, const HeightField& terrain, const Vec2& middl
     const Vec3 out = std::cos(roll) * across + std::sin(roll) * Vec3::UnitZ() + 0.7 * along;
     const std::array<Vec3, 2> stub{
         butt + t * (top - butt),
-        butt + t * (top - butt) + random.uniform(0.3, 0.8) * out.normalized()};
+        butt + t * (top - butt) + random.uniform(0.3, kMaxStubLength) * out.normalized()};
     const std::array<double, 2> stub_radii{0.022, 0.007};
     builder.add_tube(object, stub, stub_radii, 5);
     builder.add_collision_capsule(object, stub[0], stub[1], stub_radii[0]);

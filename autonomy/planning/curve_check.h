@@ -12,7 +12,7 @@
 /// blocked: nothing is planned where nothing can be seen.
 namespace arex {
 
-inline constexpr double kGrazeLength_m = 1e-3;  ///< pieces shorter than this are not halved again
+inline constexpr double kGrazeLength_m = 1e-4;  ///< pieces shorter than this are not halved again
 
 /// A stretch of a spline that touches blocked cells; both ends are free points of the curve unless
 /// they are the curve's own ends.

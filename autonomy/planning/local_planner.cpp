@@ -12,12 +12,14 @@
 namespace arex {
 namespace {
 
-constexpr double kPathSpacing = 0.02;     ///< m between points of an initial path
-constexpr double kSlower = 0.8;           ///< between attempts to time a path
+constexpr double kPathSpacing = 0.02;   ///< m between points of an initial path
+constexpr double kWorthRetiming = 0.9;  ///< retime when that takes less than this share of the time
+constexpr double kSlower = 0.8;         ///< between attempts to time a path
 constexpr double kCollisionGrowth = 2.0;  ///< of lambda_c per rebound (EGO-Planner)
 /// Corner roundings (m) tried for a path, from fast to close.
 constexpr double kRoundings[] = {0.4, 0.25, 0.12, 0.05, 0.02};
 constexpr double kShortcutMargins[] = {0.06, 0.01};
+constexpr double kJoinRoundings[] = {0.25, 0.05};
 constexpr double kJoins[] = {1.2, 0.8, 0.5};  ///< m ahead where a moving start joins a path
 constexpr double kAtRest = 1e-3;              ///< m/s, m/s^2
 
@@ -27,6 +29,13 @@ std::vector<Vec3> sample_quintic(const Quintic& motion, double length_m) {
   points.reserve(static_cast<std::size_t>(n) + 1);
   for (int i = 0; i <= n; ++i) points.push_back(motion.position(motion.duration_s() * i / n));
   return points;
+}
+
+/// The first spans, which the start's state decides.
+UniformBspline leading_part(const UniformBspline& spline) {
+  constexpr std::ptrdiff_t kLeading = 7;
+  const auto& q = spline.control_points();
+  return {{q.begin(), q.begin() + std::min(kLeading, std::ssize(q))}, spline.knot_span_s()};
 }
 
 }  // namespace
@@ -229,6 +238,8 @@ std::optional<UniformBspline> LocalPlanner::time_within_limits(const GridView& g
     UniformBspline timed = time_path(path, start, tried, config_.timing_knot_span_s, cap);
     const bool within = within_limits(timed, start, limit);
     if (within && !first_collision(grid, timed)) return timed;
+    // What is wrong at the start follows from the start's own state: slower does not mend it.
+    if (!within && !within_limits(leading_part(timed), start, limit)) break;
     tried.max_acceleration_mps2 *= kSlower;
     tried.max_speed_mps *= kSlower;
   }
@@ -286,19 +297,27 @@ std::optional<UniformBspline> LocalPlanner::follow_path(const GridView& grid,
                                                         const std::vector<Vec3>& path,
                                                         const MotionState& start,
                                                         const MotionLimits& limit) const {
-  const bool moving = start.v.norm() > kAtRest || start.a.norm() > kAtRest;
   for (const double margin : kShortcutMargins) {
     const std::vector<Vec3> corners = shortcut(grid, path, margin);
     for (const double rounding : kRoundings) {
-      const std::vector<Vec3> rounded = round_corners(corners, rounding);
-      if (!moving) {
-        if (auto timed = time_within_limits(grid, rounded, start, limit)) return timed;
-        continue;
+      if (auto timed = time_within_limits(grid, round_corners(corners, rounding), start, limit)) {
+        return timed;
       }
-      for (const double reach : kJoins) {
-        const auto joined = join_path(start, rounded, reach);
-        if (auto timed = time_within_limits(grid, joined, start, limit)) return timed;
-      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<UniformBspline> LocalPlanner::join_and_follow(const GridView& grid,
+                                                            const std::vector<Vec3>& path,
+                                                            const MotionState& start,
+                                                            const MotionLimits& limit) const {
+  const std::vector<Vec3> corners = shortcut(grid, path, kShortcutMargins[0]);
+  for (const double rounding : kJoinRoundings) {
+    const std::vector<Vec3> rounded = round_corners(corners, rounding);
+    for (const double reach : kJoins) {
+      const auto joined = join_path(start, rounded, reach);
+      if (auto timed = time_within_limits(grid, joined, start, limit)) return timed;
     }
   }
   return std::nullopt;
@@ -358,9 +377,12 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
   const std::vector<Vec3> corners = shortcut(grid, way.path, kShortcutMargins[0]);
   const std::vector<Vec3> guided = round_corners(corners, config_.control_point_distance_m);
   if (attempt(PlanStage::kGuided, guided, dt)) return;
-  if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit))) return;
   if (request.start.v.norm() > kAtRest || request.start.a.norm() > kAtRest) {
+    auto joined = join_and_follow(grid, way.path, request.start, limit);
+    if (accept(PlanStage::kPathFollowing, std::move(joined))) return;
     if (accept(PlanStage::kStopAndFollow, stop_and_follow(grid, request, diagnostics))) return;
+  } else if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit))) {
+    return;
   }
   for (int i = 0; i < config_.random_starts; ++i) {
     if (attempt(PlanStage::kRandom, random_path(request, i), dt)) return;
@@ -370,17 +392,39 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
 
 void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& request,
                                        PlanResult& result) {
-  const KnownPrefix prefix = known_free_prefix(grid, result.trajectory, 0.0);
+  const KnownPrefix prefix = known_free_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
   if (prefix.whole) return;
   const double braking = 0.8 * config_.max_acceleration_mps2;
   const auto cap = [&](double s) {
-    return stoppable_speed(prefix.length_m - s, braking, config_.reaction_s);
+    return std::max(config_.unknown_speed_mps,
+                    stoppable_speed(prefix.length_m - s, braking, config_.reaction_s));
   };
-  auto slowed = time_within_limits(grid, sample_path(result.trajectory, kPathSpacing),
-                                   request.start, limits(request), cap);
-  if (!slowed) return;
-  result.trajectory = *std::move(slowed);
+  std::vector<Vec3> path = sample_path(result.trajectory, kPathSpacing);
+  if (config_.unknown_speed_mps <= 0) {  // the unknown is not entered: come to rest before it
+    double length = 0;
+    std::size_t end = 1;
+    while (end < path.size() && length < prefix.length_m) {
+      length += (path[end] - path[end - 1]).norm();
+      ++end;
+    }
+    path.resize(std::max<std::size_t>(2, end - 1));
+    result.goal = path.back();
+  }
   result.diagnostics.slowed = true;
+  if (auto slowed = time_within_limits(grid, path, request.start, limits(request), cap)) {
+    result.trajectory = *std::move(slowed);
+    return;
+  }
+  // Too fast already for that: brake as hard as the limits allow.
+  auto stop =
+      find_stop(grid, request.start, limits(request), config_.timing_knot_span_s, request.goal);
+  if (stop) {
+    result.trajectory = *std::move(stop);
+    result.goal = result.trajectory.control_points().back();
+  } else {
+    result.trajectory = {};
+    result.status = PlanStatus::kRefineRejected;
+  }
 }
 
 PlanResult LocalPlanner::plan(const GridView& grid, const PlanRequest& request) {

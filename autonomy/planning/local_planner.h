@@ -121,6 +121,10 @@ class LocalPlanner {
                                                           const std::vector<Vec3>& path,
                                                           const MotionState& start,
                                                           const MotionLimits& limits) const;
+  [[nodiscard]] std::optional<UniformBspline> join_and_follow(const GridView& grid,
+                                                              const std::vector<Vec3>& path,
+                                                              const MotionState& start,
+                                                              const MotionLimits& limits) const;
   [[nodiscard]] std::optional<UniformBspline> stop_and_follow(const GridView& grid,
                                                               const PlanRequest& request,
                                                               PlanDiagnostics& diagnostics);

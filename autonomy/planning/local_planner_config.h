@@ -33,7 +33,7 @@ struct LocalPlannerConfig {
   LbfgsConfig rebound{16, 80, 0.01};
   LbfgsConfig refine{16, 80, 0.001};
   int max_rebounds = 6;
-  int random_starts = 2;
+  int random_starts = 1;
   double random_amplitude = 0.3;  ///< of the distance
   SearchConfig search;
 
@@ -46,7 +46,8 @@ struct LocalPlannerConfig {
   double escape_distance_m = 1.5;
   double escape_speed_mps = 0.5;
   bool stop_in_known_space = true;
-  double reaction_s = 0.1;  ///< between seeing and braking: one LiDAR frame
+  double unknown_speed_mps = 0.3;  ///< stops within the inflation
+  double reaction_s = 0.1;         ///< between seeing and braking: one LiDAR frame
 
   [[nodiscard]] MotionLimits limits() const {
     return {max_speed_mps, max_acceleration_mps2, timing_jerk_mps3};
@@ -86,6 +87,7 @@ struct LocalPlannerConfig {
     f("escape_distance_m", escape_distance_m, "furthest way out of the inflation");
     f("escape_speed_mps", escape_speed_mps, "speed of an escape");
     f("stop_in_known_space", stop_in_known_space, "slow down before unknown cells");
+    f("unknown_speed_mps", unknown_speed_mps, "speed at which unknown cells may be entered");
     f("reaction_s", reaction_s, "between seeing and braking");
     f.check(max_speed_mps > 0, "max_speed_mps > 0");
     f.check(max_acceleration_mps2 > 0, "max_acceleration_mps2 > 0");

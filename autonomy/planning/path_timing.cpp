@@ -6,12 +6,14 @@
 namespace arex {
 namespace {
 
-constexpr double kStation = 0.02;         ///< m between stations of the speed profile
-constexpr int kCurvatureReach = 3;        ///< stations to each side that a curvature is taken over
-constexpr double kBrakingShare = 0.85;    ///< of the acceleration limit that the plan brakes with
-constexpr double kCurvatureShare = 0.9;   ///< of it that curves are taken with
-constexpr double kSubstep = 0.0125;       ///< s, of the forward simulation
-constexpr double kCreep_mps = 0.02;       ///< lowest speed before the end
+constexpr double kStation = 0.02;        ///< m between stations of the speed profile
+constexpr int kCurvatureReach = 3;       ///< stations to each side that a curvature is taken over
+constexpr double kBrakingShare = 0.85;   ///< of the acceleration limit that the plan brakes with
+constexpr double kCurvatureShare = 0.9;  ///< of it that curves are taken with
+constexpr double kSubstep = 0.0125;      ///< s, of the forward simulation
+constexpr double kCreep_mps = 0.02;      ///< lowest speed before the end
+constexpr double kArrived = 5e-4;        ///< m before the end at which the motion is over
+constexpr double kLeastShare = 0.2;  ///< of the acceleration limit left along the path in curves
 constexpr double kMaxDuration_s = 120.0;  ///< a budget, not a limit of flight
 constexpr int kBlend = 8;                 ///< control points over which the start's offset fades
 
@@ -70,32 +72,39 @@ std::vector<double> allowed_speed(const Stations& path, const MotionLimits& limi
   return v;
 }
 
-/// Arc lengths of the motion, one per knot span from t = 0.
+/// The speed allowed at an arc length; between stations v^2 is linear, as under constant braking.
+double allowed_at(const Stations& path, const std::vector<double>& allowed, double s) {
+  const double x = std::clamp(s / path.step, 0.0, static_cast<double>(allowed.size() - 1));
+  const auto i = std::min(static_cast<std::size_t>(x), allowed.size() - 2);
+  const double u = x - static_cast<double>(i);
+  return std::sqrt((1 - u) * allowed[i] * allowed[i] + u * allowed[i + 1] * allowed[i + 1]);
+}
+
+/// Arc lengths of the motion, one per knot span from t = 0: a simulation whose acceleration steers
+/// the speed to what is allowed a moment ahead. That moment is the time which the jerk limit takes
+/// to build up full acceleration, so braking is begun in time and no limit is overshot.
 std::vector<double> simulate(const Stations& path, const std::vector<double>& allowed,
                              const MotionLimits& limits, double start_speed,
                              double start_acceleration, double knot_span_s) {
   const int substeps = std::max(1, static_cast<int>(std::ceil(knot_span_s / kSubstep)));
   const double h = knot_span_s / substeps, length = path.length();
   const double full = limits.max_acceleration_mps2;
+  const double ahead = std::max(full / limits.max_jerk_mps3, 2 * h);
+  const double jerk_step = limits.max_jerk_mps3 * h;
   double s = 0, v = start_speed, a = start_acceleration;
   std::vector<double> knots{0.0};
   const auto max_knots = static_cast<std::size_t>(kMaxDuration_s / knot_span_s);
-  while (s < length && knots.size() < max_knots) {
+  while (length - s > kArrived && knots.size() < max_knots) {
     for (int k = 0; k < substeps; ++k) {
-      const double ahead = std::min(s + v * h, length);
-      const double x = ahead / path.step;
-      const auto i = std::min(static_cast<std::size_t>(x), allowed.size() - 2);
-      const double u = x - static_cast<double>(i);
-      // Between stations v^2 is linear.
-      const double target =
-          std::max(kCreep_mps, std::sqrt(std::max(0.0, (1 - u) * allowed[i] * allowed[i] +
-                                                           u * allowed[i + 1] * allowed[i + 1])));
+      double wanted = full;
+      for (const double moment : {0.25 * ahead, 0.5 * ahead, ahead}) {
+        const double target = std::max(kCreep_mps, allowed_at(path, allowed, s + v * moment));
+        wanted = std::min(wanted, (target - v) / moment);
+      }
       const double turning = v * v * path.curvature[path.index(s)];
       const double along =
-          std::max(0.2 * full, std::sqrt(std::max(0.0, full * full - turning * turning)));
-      double wanted = std::clamp((target - v) / h, -along, along);
-      const double jerk_step = limits.max_jerk_mps3 * h;
-      wanted = std::clamp(wanted, a - jerk_step, a + jerk_step);
+          std::max(kLeastShare * full, std::sqrt(std::max(0.0, full * full - turning * turning)));
+      wanted = std::clamp(std::clamp(wanted, -along, along), a - jerk_step, a + jerk_step);
       const double v_next = std::max(0.0, v + wanted * h);
       s += 0.5 * (v + v_next) * h;
       a = wanted;

@@ -5,36 +5,58 @@
 #include <limits>
 
 #include "planning/curve_check.h"
-#include "planning/quintic.h"
+#include "planning/free_space.h"
 
 namespace arex {
 namespace {
 
-constexpr double kLimitShare = 1.04;  ///< of the acceleration limit that a stop may use
-constexpr double kStretch = 1.12;     ///< between tried durations
-constexpr int kMaxStretches = 14;
+constexpr double kRoomLooked_m = 1.0;  ///< clearances beyond this are all alike
+constexpr double kAtRest_mps = 1e-9;
+/// Swerves tried: angle (rad) of the first push from straight back, and how long it lasts (s).
+constexpr double kSwerveAngles[] = {0.35, 0.7, 1.05, 1.4};
+constexpr double kSwerveTimes[] = {0.1, 0.2, 0.3, 0.45};
 
-std::optional<UniformBspline> stop_at(const MotionState& state, const Vec3& offset,
-                                      double duration_s, const MotionLimits& limits,
-                                      double knot_span_s) {
-  const int knots = std::max(5, static_cast<int>(std::ceil(duration_s / knot_span_s)));
-  const Vec3 end =
-      state.p + state.v * (duration_s / 2) + state.a * (duration_s * duration_s / 12) + offset;
-  const Quintic motion(state, {end, Vec3::Zero(), Vec3::Zero()}, knots * knot_span_s);
-  std::vector<Vec3> points;
-  for (int k = 0; k <= knots; ++k) points.push_back(motion.position(k * knot_span_s));
-  UniformBspline spline =
-      UniformBspline::fit(points, state, {end, Vec3::Zero(), Vec3::Zero()}, knot_span_s);
-  // What the start already has cannot be taken back at once.
-  const double acceleration = std::max(limits.max_acceleration_mps2, state.a.norm());
-  const double speed = std::max(limits.max_speed_mps, state.v.norm());
-  if (spline.acceleration_bound() > kLimitShare * acceleration) return std::nullopt;
-  if (spline.speed_bound() > kLimitShare * speed) return std::nullopt;
-  return spline;
+/// Pushes with a constant acceleration for a while, then brakes along the velocity until at rest.
+/// Written straight into the control points, so |A_i| is the limit itself and the ramp from the
+/// start's acceleration takes one knot span.
+UniformBspline stop_with(const MotionState& state, const Vec3& push, double push_s,
+                         const MotionLimits& limits, double dt) {
+  const auto head = UniformBspline::boundary(state, dt);
+  std::vector<Vec3> q(head.begin(), head.end());
+  Vec3 v = (q[2] - q[1]) / dt;  // V_1
+  const double step = limits.max_acceleration_mps2 * dt;
+  const int pushes = static_cast<int>(std::lround(push_s / dt));
+  for (int k = 0; v.norm() > kAtRest_mps || k < pushes; ++k) {
+    if (k < pushes) {
+      v += push * dt;
+    } else {
+      v = v.norm() > step ? Vec3(v - step * v.normalized()) : Vec3::Zero();
+    }
+    q.push_back(q.back() + v * dt);
+  }
+  const Vec3 end = q.back();
+  q.insert(q.end(), 2, end);
+  while (q.size() < 7) q.push_back(end);
+  return {std::move(q), dt};
 }
 
-double shortest_duration(const MotionState& state, const MotionLimits& limits) {
-  return std::max(4 * 0.05, state.v.norm() / limits.max_acceleration_mps2);
+template <class Visit>
+void for_each_swerve(const MotionState& state, const MotionLimits& limits, double dt, Visit visit) {
+  const double speed = state.v.norm();
+  if (speed < kAtRest_mps) return;
+  const Vec3 ahead = state.v / speed;
+  const Vec3 across = Vec3::UnitZ().cross(ahead);
+  const Vec3 left = across.norm() > 1e-6 ? Vec3(across.normalized()) : Vec3::UnitY();
+  const Vec3 up = ahead.cross(left);
+  for (const Vec3& side : {left, Vec3(-left), up, Vec3(-up)}) {
+    for (const double angle : kSwerveAngles) {
+      const Vec3 push =
+          limits.max_acceleration_mps2 * (std::sin(angle) * side - std::cos(angle) * ahead);
+      for (const double duration : kSwerveTimes) {
+        visit(stop_with(state, push, duration, limits, dt));
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -49,18 +71,20 @@ double stoppable_speed(double distance, double braking, double reaction_s) {
   return std::sqrt(b * b + 2 * braking * distance) - b;
 }
 
-KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline, double from_s) {
+KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline, double from_s,
+                              double own_radius_m) {
   KnownPrefix prefix{from_s, 0.0, false};
   const double dt = spline.knot_span_s();
   double t = std::clamp(from_s, 0.0, spline.duration_s());
-  Vec3 p = spline.position(t);
+  const Vec3 start = spline.position(t);
+  Vec3 p = start;
   while (t < spline.duration_s()) {
     const int span = std::min(static_cast<int>(t / dt), spline.spans() - 1);
     const double speed = std::max(spline.speed_bound(span), 1e-3);
     const double next =
         std::min({t + 0.25 * grid.resolution_m / speed, t + 0.25 * dt, spline.duration_s()});
     const Vec3 q = spline.position(next);
-    if (!grid.known(q) || grid.inflated(q)) return prefix;
+    if (grid.inflated(q) || (!grid.known(q) && (q - start).norm() > own_radius_m)) return prefix;
     prefix.length_m += (q - p).norm();
     prefix.end_s = t = next;
     p = q;
@@ -70,51 +94,43 @@ KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline
 }
 
 UniformBspline brake(const MotionState& state, const MotionLimits& limits, double dt) {
-  double duration = shortest_duration(state, limits);
-  for (int k = 0; k < 4 * kMaxStretches; ++k, duration *= kStretch) {
-    if (auto spline = stop_at(state, Vec3::Zero(), duration, limits, dt)) return *std::move(spline);
-  }
-  // Only an absurd start comes here; stop where its velocity leads, slowly.
-  const Vec3 end = state.p + state.v * (duration / 2);
-  const int knots = std::max(5, static_cast<int>(std::ceil(duration / dt)));
-  const Quintic motion(state, {end, Vec3::Zero(), Vec3::Zero()}, knots * dt);
-  std::vector<Vec3> points;
-  for (int k = 0; k <= knots; ++k) points.push_back(motion.position(k * dt));
-  return UniformBspline::fit(points, state, {end, Vec3::Zero(), Vec3::Zero()}, dt);
+  return stop_with(state, Vec3::Zero(), 0.0, limits, dt);
 }
 
 std::optional<UniformBspline> find_stop(const GridView& grid, const MotionState& state,
                                         const MotionLimits& limits, double dt,
                                         const Vec3& towards) {
-  const double speed = state.v.norm();
   UniformBspline straight = brake(state, limits, dt);
   if (!first_collision(grid, straight)) return straight;
-  const Vec3 ahead = speed > 1e-6 ? Vec3(state.v / speed) : Vec3::UnitX();
-  Vec3 left = Vec3::UnitZ().cross(ahead);
-  left = left.norm() > 1e-6 ? left.normalized() : Vec3::UnitY();
-  const Vec3 up = ahead.cross(left);
-
   std::optional<UniformBspline> best;
   double best_distance = std::numeric_limits<double>::infinity();
-  const double reach = stopping_distance(speed, limits.max_acceleration_mps2, 0.1);
-  for (const double sideways : {-1.0, -0.7, -0.4, -0.2, 0.0, 0.2, 0.4, 0.7, 1.0}) {
-    for (const double upwards : {0.0, -0.4, 0.4}) {
-      for (const double forwards : {-0.3, 0.0, 0.5}) {
-        const Vec3 offset = reach * (sideways * left + upwards * up + forwards * ahead);
-        double duration = shortest_duration(state, limits);
-        for (int k = 0; k < kMaxStretches; ++k, duration *= kStretch) {
-          auto spline = stop_at(state, offset, duration, limits, dt);
-          if (!spline) continue;
-          const double distance = (spline->control_points().back() - towards).norm();
-          if (distance < best_distance && !first_collision(grid, *spline)) {
-            best_distance = distance;
-            best = std::move(spline);
-          }
-          break;
-        }
-      }
+  for_each_swerve(state, limits, dt, [&](UniformBspline stop) {
+    const double distance = (stop.control_points().back() - towards).norm();
+    if (distance >= best_distance || first_collision(grid, stop)) return;
+    best_distance = distance;
+    best = std::move(stop);
+  });
+  return best;
+}
+
+UniformBspline widest_stop(const GridView& grid, const MotionState& state,
+                           const MotionLimits& limits, double dt) {
+  const auto room = [&](const UniformBspline& stop) {
+    double least = kRoomLooked_m;
+    for (const double share : {0.3, 0.6, 1.0}) {
+      least =
+          std::min(least, clearance(grid, stop.position(share * stop.duration_s()), kRoomLooked_m));
     }
-  }
+    return least;
+  };
+  UniformBspline best = brake(state, limits, dt);
+  double best_room = room(best);
+  for_each_swerve(state, limits, dt, [&](UniformBspline stop) {
+    const double found = room(stop);
+    if (found <= best_room) return;
+    best_room = found;
+    best = std::move(stop);
+  });
   return best;
 }
 

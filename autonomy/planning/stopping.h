@@ -16,15 +16,17 @@ namespace arex {
 [[nodiscard]] double stoppable_speed(double distance_m, double braking_mps2, double reaction_s);
 
 /// The longest safe prefix of a spline: from `from_s` on, everything before it is known and free.
+/// What lies within `own_radius_m` of where it begins is the vehicle's own place and counts as
+/// known.
 struct KnownPrefix {
   double end_s = 0;     ///< time on the spline
   double length_m = 0;  ///< arc length from from_s
   bool whole = false;   ///< nothing unknown up to the end
 };
 [[nodiscard]] KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline,
-                                            double from_s);
+                                            double from_s, double own_radius_m);
 
-/// The shortest motion to rest straight on: minimum jerk within the limits.
+/// The shortest motion to rest straight on, at the acceleration limit.
 [[nodiscard]] UniformBspline brake(const MotionState& state, const MotionLimits& limits,
                                    double knot_span_s);
 
@@ -34,5 +36,10 @@ struct KnownPrefix {
                                                       const MotionState& state,
                                                       const MotionLimits& limits,
                                                       double knot_span_s, const Vec3& towards);
+
+/// For when nothing is free: the stop, straight or swerving, that keeps the greatest clearance from
+/// occupied cells.
+[[nodiscard]] UniformBspline widest_stop(const GridView& grid, const MotionState& state,
+                                         const MotionLimits& limits, double knot_span_s);
 
 }  // namespace arex

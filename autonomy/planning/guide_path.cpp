@@ -1,0 +1,248 @@
+#include "planning/guide_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+namespace arex {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kMargin = 20;            ///< cells searched around map, start and goal
+constexpr std::size_t kMaxPull = 200;  ///< cells that one straight piece may replace
+constexpr double kBlocked = -1.0;
+
+/// The map grown by everything that the search may enter, as the cost of a metre in each cell.
+class CostMap {
+ public:
+  CostMap(const OccupancyMap2D& map, const Vec2& from, const Vec2& to, const GuideConfig& config)
+      : map_(map), config_(config) {
+    const Eigen::Vector2i a = map.cell_of(from), b = map.cell_of(to);
+    const Eigen::Vector2i end(map.width - 1, map.height - 1);
+    low_ = a.cwiseMin(b).cwiseMin(Eigen::Vector2i::Zero()).array() - kMargin;
+    const Eigen::Vector2i high = (a.cwiseMax(b).cwiseMax(end)).array() + kMargin;
+    size_ = high - low_ + Eigen::Vector2i::Ones();
+    measure_distances();
+    const double near = config.obstacle_distance_m;
+    cost_.resize(distance_.size());
+    for (int y = 0; y < size_.y(); ++y) {
+      for (int x = 0; x < size_.x(); ++x) {
+        const Eigen::Vector2i cell = low_ + Eigen::Vector2i(x, y);
+        const std::size_t i = index(cell);
+        const Vec2 centre = map.centre_of(cell);
+        const bool at_end = (centre - from).norm() <= near || (centre - to).norm() <= near;
+        const double d = distance_[i] * map.resolution;
+        if (d <= 0 || (d < near && !at_end)) {
+          cost_[i] = kBlocked;
+          continue;
+        }
+        cost_[i] = 1.0;
+        if (map.at(cell) == OccupancyMap2D::kUnknown) cost_[i] += config.unknown_weight;
+        if (d < config.comfort_distance_m) {
+          const double span = std::max(config.comfort_distance_m - near, 1e-9);
+          cost_[i] += config.comfort_weight * std::min(1.0, (config.comfort_distance_m - d) / span);
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const { return cost_.size(); }
+  [[nodiscard]] bool contains(const Eigen::Vector2i& cell) const {
+    return ((cell - low_).array() >= 0).all() && ((cell - low_).array() < size_.array()).all();
+  }
+  [[nodiscard]] std::size_t index(const Eigen::Vector2i& cell) const {
+    return static_cast<std::size_t>(cell.y() - low_.y()) * static_cast<std::size_t>(size_.x()) +
+           static_cast<std::size_t>(cell.x() - low_.x());
+  }
+  [[nodiscard]] Eigen::Vector2i cell(std::size_t index) const {
+    const int i = static_cast<int>(index);
+    return low_ + Eigen::Vector2i(i % size_.x(), i / size_.x());
+  }
+  [[nodiscard]] bool passable(const Eigen::Vector2i& cell) const {
+    return contains(cell) && cost_[index(cell)] != kBlocked;
+  }
+  [[nodiscard]] double cost(std::size_t index) const { return cost_[index]; }
+
+  /// Cost of the straight line between two points, infinite if it is blocked.
+  [[nodiscard]] double line_cost(const Vec2& a, const Vec2& b) const {
+    const double length = (b - a).norm();
+    const int n = std::max(1, static_cast<int>(std::ceil(4 * length / map_.resolution)));
+    double sum = 0;
+    for (int i = 0; i <= n; ++i) {
+      const Eigen::Vector2i cell = map_.cell_of(a + (b - a) * (static_cast<double>(i) / n));
+      if (!passable(cell)) return kInfinity;
+      sum += cost_[index(cell)];
+    }
+    return sum / (n + 1) * length;
+  }
+
+ private:
+  /// Distances (cells) to the nearest occupied cell, by a two-pass chamfer transform.
+  void measure_distances() {
+    const auto n = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y());
+    distance_.assign(n, 1e9);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (map_.at(cell(i)) == OccupancyMap2D::kOccupied) distance_[i] = 0;
+    }
+    const auto relax = [&](int x, int y, int dx, int dy, double step) {
+      if (x + dx < 0 || x + dx >= size_.x() || y + dy < 0 || y + dy >= size_.y()) return;
+      const auto w = static_cast<std::size_t>(size_.x());
+      double& d = distance_[static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x)];
+      d = std::min(
+          d,
+          step +
+              distance_[static_cast<std::size_t>(y + dy) * w + static_cast<std::size_t>(x + dx)]);
+    };
+    for (int y = 0; y < size_.y(); ++y) {
+      for (int x = 0; x < size_.x(); ++x) {
+        relax(x, y, -1, 0, 1.0);
+        relax(x, y, 0, -1, 1.0);
+        relax(x, y, -1, -1, M_SQRT2);
+        relax(x, y, 1, -1, M_SQRT2);
+      }
+    }
+    for (int y = size_.y() - 1; y >= 0; --y) {
+      for (int x = size_.x() - 1; x >= 0; --x) {
+        relax(x, y, 1, 0, 1.0);
+        relax(x, y, 0, 1, 1.0);
+        relax(x, y, 1, 1, M_SQRT2);
+        relax(x, y, -1, 1, M_SQRT2);
+      }
+    }
+  }
+
+  const OccupancyMap2D& map_;
+  const GuideConfig& config_;
+  Eigen::Vector2i low_, size_;
+  std::vector<double> distance_, cost_;
+};
+
+/// Straightens where the straight line costs no more than the path between its ends.
+std::vector<Vec2> pull_straight(const CostMap& costs, std::span<const Vec2> path) {
+  std::vector<Vec2> kept{path.front()};
+  std::size_t at = 0;
+  while (at + 1 < path.size()) {
+    std::size_t next = at + 1;
+    double along = costs.line_cost(path[at], path[next]);
+    for (std::size_t i = at + 2; i < std::min(path.size(), at + kMaxPull); ++i) {
+      along += costs.line_cost(path[i - 1], path[i]);
+      const double straight = costs.line_cost(path[at], path[i]);
+      if (straight == kInfinity) break;
+      if (straight <= along + 1e-9) next = i;
+    }
+    kept.push_back(path[next]);
+    at = next;
+  }
+  return kept;
+}
+
+}  // namespace
+
+GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to,
+                     const GuideConfig& config) {
+  GuidePath result;
+  if (config.mode == GuideMode::kStraight) {
+    result.status = GuideStatus::kFound;
+    result.points = {from, to};
+    result.cost = (to - from).norm();
+    return result;
+  }
+  const CostMap costs(map, from, to, config);
+  const Eigen::Vector2i goal_cell = map.cell_of(to);
+  const std::size_t source = costs.index(map.cell_of(from)), goal = costs.index(goal_cell);
+  std::vector<double> cost(costs.count(), kInfinity);
+  std::vector<std::int32_t> parent(costs.count(), -1);
+  std::vector<bool> closed(costs.count(), false);
+  const auto remaining = [&](const Eigen::Vector2i& cell) {
+    const Eigen::Vector2i d = (cell - goal_cell).cwiseAbs();
+    return map.resolution * (d.maxCoeff() + (M_SQRT2 - 1) * d.minCoeff());  // octile
+  };
+  using Entry = std::pair<double, std::size_t>;  // ties by index
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  cost[source] = 0;
+  open.push({remaining(costs.cell(source)), source});
+  std::size_t nearest = source;
+  while (!open.empty() && result.expansions < config.max_expansions) {
+    const std::size_t node = open.top().second;
+    open.pop();
+    if (closed[node]) continue;
+    closed[node] = true;
+    ++result.expansions;
+    const Eigen::Vector2i cell = costs.cell(node);
+    if (remaining(cell) < remaining(costs.cell(nearest))) nearest = node;
+    if (node == goal) break;
+    for (int k = 0; k < 9; ++k) {
+      const Eigen::Vector2i step(k / 3 - 1, k % 3 - 1);
+      const Eigen::Vector2i next = cell + step;
+      if (k == 4 || !costs.passable(next)) continue;
+      if (!costs.passable({cell.x() + step.x(), cell.y()}) ||
+          !costs.passable({cell.x(), cell.y() + step.y()})) {
+        // The start's own cell may be blocked; it is only left, never passed by.
+        if (step.x() != 0 && step.y() != 0) continue;
+      }
+      const std::size_t there = costs.index(next);
+      const double length = map.resolution * step.cast<double>().norm();
+      const double here = std::max(1.0, costs.cost(node));
+      const double through = cost[node] + length * 0.5 * (here + costs.cost(there));
+      if (through >= cost[there]) continue;
+      cost[there] = through;
+      parent[there] = static_cast<std::int32_t>(node);
+      open.push({through + remaining(next), there});
+    }
+  }
+  const bool found = closed[goal];
+  result.status = found ? GuideStatus::kFound : GuideStatus::kPartial;
+  result.cost = cost[nearest];
+  std::vector<Vec2> path;
+  for (auto at = static_cast<std::int32_t>(nearest); at >= 0;
+       at = parent[static_cast<std::size_t>(at)]) {
+    path.push_back(map.centre_of(costs.cell(static_cast<std::size_t>(at))));
+  }
+  std::reverse(path.begin(), path.end());
+  path.front() = from;
+  if (found) path.back() = to;
+  if (path.size() == 1) path.push_back(found ? to : from);
+  result.points = pull_straight(costs, path);
+  return result;
+}
+
+std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z) {
+  double length = 0;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) length += (path[i + 1] - path[i]).norm();
+  std::vector<Vec3> lifted;
+  double walked = 0;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (i > 0) walked += (path[i] - path[i - 1]).norm();
+    const double share = length > 0 ? walked / length : 1.0;
+    lifted.push_back({path[i].x(), path[i].y(), from_z + share * (to_z - from_z)});
+  }
+  return lifted;
+}
+
+Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m) {
+  if (path.size() < 2) return path.empty() ? p : path.front();
+  std::size_t best = 0;
+  double best_distance = kInfinity;
+  Vec3 at = path.front();
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const Vec3 d = path[i + 1] - path[i];
+    const double u = std::clamp((p - path[i]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
+    const Vec3 foot = path[i] + u * d;
+    // Of equally near feet the later one: a path that returns is not flown twice.
+    if ((foot - p).norm() <= best_distance) {
+      best_distance = (foot - p).norm();
+      best = i;
+      at = foot;
+    }
+  }
+  for (std::size_t i = best; i + 1 < path.size(); ++i) {
+    const double piece = (path[i + 1] - at).norm();
+    if (piece >= ahead_m) return at + (path[i + 1] - at) * (ahead_m / piece);
+    ahead_m -= piece;
+    at = path[i + 1];
+  }
+  return path.back();
+}
+
+}  // namespace arex

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "mapping/occupancy_map_2d.h"
+#include "math/types.h"
+
+namespace arex {
+
+enum class GuideMode { kStraight, kAstar };
+inline const std::array<std::string_view, 2>& enum_names(GuideMode) {
+  static const std::array<std::string_view, 2> names{"straight", "astar"};
+  return names;
+}
+
+struct GuideConfig {
+  GuideMode mode = GuideMode::kAstar;
+  double obstacle_distance_m = 0.6;  ///< kept from occupied cells: inflation and a cell
+  double comfort_distance_m = 1.5;   ///< nearer than this costs more, linearly
+  double comfort_weight = 2.0;       ///< at obstacle_distance_m, per metre flown
+  double unknown_weight = 2.0;       ///< extra cost of a metre through the unknown
+  int max_expansions = 2'000'000;
+
+  void fields(auto& f) {
+    f("mode", mode, "global guide: straight line, or A* over the 2D map");
+    f("obstacle_distance_m", obstacle_distance_m, "distance kept from occupied cells");
+    f("comfort_distance_m", comfort_distance_m, "distance below which flying costs more");
+    f("comfort_weight", comfort_weight, "extra cost of a metre at the obstacle distance");
+    f("unknown_weight", unknown_weight, "extra cost of a metre through unknown cells");
+    f("max_expansions", max_expansions, "A* expansions");
+    f.check(obstacle_distance_m >= 0, "obstacle_distance_m >= 0");
+    f.check(comfort_distance_m >= obstacle_distance_m, "comfort_distance_m >= obstacle_distance_m");
+    f.check(unknown_weight >= 0, "unknown_weight >= 0");
+  }
+};
+
+enum class GuideStatus {
+  kFound,
+  kPartial,  ///< the target cannot be reached: the path ends where it comes nearest
+};
+
+struct GuidePath {
+  GuideStatus status = GuideStatus::kPartial;
+  std::vector<Vec2> points;  ///< polyline in O from the start, m
+  double cost = 0;
+  int expansions = 0;
+};
+
+/// The guide for goals further than the local grid: an 8-connected A* over the 2D occupancy map,
+/// corners not cut, then pulled straight where that is no dearer. Outside the map everything is
+/// unknown, and unknown cells may be crossed at a cost. Start and goal may lie too close to
+/// obstacles: the cells within obstacle_distance_m of either may be crossed unless occupied.
+[[nodiscard]] GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to,
+                                   const GuideConfig& config);
+
+/// Gives a 2D polyline heights, linear in its length.
+[[nodiscard]] std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z);
+
+/// The point of a polyline `ahead_m` further on than its point nearest to p; its end if shorter.
+[[nodiscard]] Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m);
+
+}  // namespace arex

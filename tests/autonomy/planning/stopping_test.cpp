@@ -1,0 +1,74 @@
+#include "planning/stopping.h"
+
+#include <gtest/gtest.h>
+
+#include "autonomy/planning/test_grid.h"
+#include "planning/curve_check.h"
+
+namespace arex {
+namespace {
+
+constexpr MotionLimits kLimits{2.0, 3.0, 30.0};
+
+TEST(Stopping, SpeedAndDistanceAreInverse) {
+  for (double v = 0; v < 4; v += 0.3) {
+    EXPECT_NEAR(stoppable_speed(stopping_distance(v, 3.0, 0.1), 3.0, 0.1), v, 1e-12);
+  }
+  EXPECT_EQ(stoppable_speed(-1.0, 3.0, 0.1), 0.0);
+}
+
+TEST(Stopping, BrakingTakesTheDistanceThatPhysicsAsks) {
+  RandomStream random(1, "brake");
+  for (int i = 0; i < 50; ++i) {
+    MotionState state;
+    state.v = test::random_point(random, -1, 1).normalized() * random.uniform(0.1, 2.0);
+    const UniformBspline s = brake(state, kLimits, 0.05);
+    EXPECT_LT((s.velocity(0) - state.v).norm(), 1e-12);
+    EXPECT_LT(s.velocity(s.duration_s()).norm(), 1e-12);
+    EXPECT_LE(s.acceleration_bound(), kLimits.max_acceleration_mps2 * (1 + 1e-9));
+    const double length = (s.position(s.duration_s()) - state.p).norm();
+    const double least = stopping_distance(state.v.norm(), kLimits.max_acceleration_mps2, 0.0);
+    EXPECT_GE(length, least - 1e-9);
+    EXPECT_LE(length, least + 2 * 0.05 * state.v.norm());
+  }
+}
+
+TEST(Stopping, SwervesWhereTheWayAheadIsTooShort) {
+  test::TestGrid grid(40, 40, 20);
+  grid.mark({24, 15, 0}, {26, 20, 19}, GridView::kInflated);  // 0.35 m ahead, its edge 0.05 m aside
+  const MotionState state{{2.05, 2.05, 1.0}, {1.5, 0, 0}, Vec3::Zero()};
+  EXPECT_TRUE(first_collision(grid.view(), brake(state, kLimits, 0.05)));
+  const auto stop = find_stop(grid.view(), state, kLimits, 0.05, {3.5, 2.0, 1.0});
+  ASSERT_TRUE(stop);
+  EXPECT_FALSE(first_collision(grid.view(), *stop));
+  EXPECT_LT((stop->velocity(0) - state.v).norm(), 1e-12);
+  EXPECT_LT(stop->velocity(stop->duration_s()).norm(), 1e-12);
+  EXPECT_LE(stop->acceleration_bound(), kLimits.max_acceleration_mps2 * (1 + 1e-9));
+}
+
+TEST(Stopping, TheWidestStopGoesWhereThereIsRoom) {
+  test::TestGrid grid(60, 60, 20);
+  grid.mark({0, 0, 0}, {59, 59, 19}, GridView::kInflated);   // no place is free
+  grid.mark({26, 0, 0}, {26, 32, 19}, GridView::kOccupied);  // a wall that ends just to the left
+  const MotionState state{{2.0, 3.2, 1.0}, {1.5, 0, 0}, Vec3::Zero()};
+  EXPECT_FALSE(find_stop(grid.view(), state, kLimits, 0.05, state.p));
+  const UniformBspline stop = widest_stop(grid.view(), state, kLimits, 0.05);
+  EXPECT_GT(stop.position(stop.duration_s()).y(), state.p.y());
+}
+
+TEST(Stopping, KnownPrefixEndsAtTheFirstUnknownCell) {
+  test::TestGrid grid(60, 20, 20);
+  grid.forget({33, 0, 0}, {59, 19, 19});
+  grid.forget({9, 9, 9}, {11, 11, 11});  // the vehicle's own shadow
+  std::vector<Vec3> q;
+  for (int i = 0; i < 20; ++i) q.push_back({0.75 + 0.25 * i, 1.05, 1.05});
+  const UniformBspline s(q, 0.2);
+  const KnownPrefix prefix = known_free_prefix(grid.view(), s, 0.0, 0.3);
+  EXPECT_FALSE(prefix.whole);
+  EXPECT_NEAR(s.position(prefix.end_s).x(), 3.3, 0.03);
+  EXPECT_NEAR(prefix.length_m, 2.3, 0.03);
+  EXPECT_EQ(known_free_prefix(grid.view(), s, 0.0, 0.0).length_m, 0.0);
+}
+
+}  // namespace
+}  // namespace arex

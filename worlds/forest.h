@@ -14,7 +14,7 @@ struct Clearing {
 
   void fields(auto& f) {
     f("centre_m", centre_m, "x, y from the start");
-    f("radius_m", radius_m, "");
+    f("radius_m", radius_m, "of the disc");
     f.check(radius_m > 0, "radius_m > 0");
   }
 };
@@ -26,7 +26,7 @@ struct Corridor {
 
   void fields(auto& f) {
     f("points_m", points_m, "x, y of its corners, from the start");
-    f("width_m", width_m, "");
+    f("width_m", width_m, "of the way");
     f.check(points_m.size() >= 2, "at least two points_m");
     f.check(width_m > 0, "width_m > 0");
   }
@@ -90,8 +90,8 @@ struct ForestRecipe {
     f("roughness_m", roughness_m, "amplitude of the bumps on it, 1-3 m long");
     f("ground_spacing_m", ground_spacing_m, "distance of the height field's samples");
     f("start_radius_m", start_radius_m, "level ground around the start, free up to the sky");
-    f("tree", tree, "");
-    f("undergrowth", undergrowth, "");
+    f("tree", tree, "one tree");
+    f("undergrowth", undergrowth, "what grows and lies between the trees");
     f("clearings", clearings, "treeless discs");
     f("corridors", corridors, "treeless ways");
     f.check(size_m.minCoeff() >= 10 && size_m.maxCoeff() <= 500, "10 <= size_m <= 500");

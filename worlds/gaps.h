@@ -29,14 +29,14 @@ struct GapsRecipe {
     f("length_m", length_m, "extent along x: from start_radius_m behind the start");
     f("width_m", width_m, "extent along y, the start in its middle; walled at both sides");
     f("wall_distance_m", wall_distance_m, "x of the pillars' axes");
-    f("pillar_radius_m", pillar_radius_m, "");
-    f("pillar_height_m", pillar_height_m, "");
+    f("pillar_radius_m", pillar_radius_m, "of the pillars in the wall");
+    f("pillar_height_m", pillar_height_m, "of every pillar");
     f("slot_m", slot_m, "between the surfaces of neighbouring pillars");
     f("gap_m", gap_m, "between the surfaces of the two pillars at the opening");
     f("gap_offset_m", gap_offset_m, "y of the middle of the opening");
     f("field_density_per_m2", field_density_per_m2, "random pillars between start and wall");
-    f("field_radius_min_m", field_radius_min_m, "");
-    f("field_radius_max_m", field_radius_max_m, "");
+    f("field_radius_min_m", field_radius_min_m, "thinnest pillar of the field");
+    f("field_radius_max_m", field_radius_max_m, "thickest pillar of the field");
     f("field_spacing_m", field_spacing_m, "least distance between the axes of those pillars");
     f("start_radius_m", start_radius_m, "no pillar stands nearer to the start");
     f.check(start_radius_m >= 0.5, "start_radius_m >= 0.5");

@@ -30,10 +30,10 @@ struct WorldConfig {
     f("vehicle_radius_m", vehicle_radius_m,
       "the start must be able to leave at this radius: motor arm 0.19 m plus a 9-inch propeller's "
       "radius");
-    f("forest", forest, "");
-    f("garage", garage, "");
-    f("gaps", gaps, "");
-    f("empty", empty, "");
+    f("forest", forest, "recipe of kind forest");
+    f("garage", garage, "recipe of kind garage");
+    f("gaps", gaps, "recipe of kind gaps");
+    f("empty", empty, "recipe of kind empty");
     f.check(vehicle_radius_m > 0 && vehicle_radius_m <= 2, "0 < vehicle_radius_m <= 2");
   }
 };

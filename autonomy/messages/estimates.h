@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <string_view>
 
 #include "math/pose.h"
 #include "math/types.h"
@@ -10,6 +12,8 @@ namespace arex {
 
 /// Health of an odometry source.
 enum class OdometryStatus { kInitialising, kOk, kDegenerate, kLost };
+inline constexpr std::array<std::string_view, 4> kOdometryStatusNames{"initialising", "ok",
+                                                                      "degenerate", "lost"};
 
 /// Pose and velocity of B in O at `stamp`.
 struct Odometry {

@@ -34,8 +34,8 @@ class JobQueue {
   JobQueue(const JobQueue&) = delete;
   JobQueue& operator=(const JobQueue&) = delete;
 
-  /// Ends the host threads; jobs not begun are dropped. To be called before anything that jobs touch
-  /// goes away.
+  /// Ends the host threads; jobs not begun are dropped. To be called before anything that jobs
+  /// touch goes away.
   void stop();
 
   Lane add_lane(std::string name);

@@ -13,6 +13,8 @@ constexpr double kLandingDepth = 100;
 Stack::Stack(const StackConfig& config, JobQueue& jobs)
     : config_(config),
       jobs_(jobs),
+      lidar_inertial_(config.odometry.lidar_inertial, config.vehicle),
+      odometry_lane_(jobs.add_lane("odometry")),
       mission_(config.mission,
                [this](EventKind kind, const std::string& detail) {
                  events_.push_back({now_, kind, detail});
@@ -21,19 +23,36 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs)
       tracker_(config.control, config.vehicle),
       control_period_(from_seconds(1 / config.control.rate_hz)) {}
 
-void Stack::add_imu(const ImuSample& imu) { odometry_.w_OB_B = imu.gyro_radps; }
+void Stack::add_imu(const ImuSample& imu) {
+  if (config_.odometry.source == OdometryConfig::Source::kLidarInertial) {
+    set_odometry(lidar_inertial_.add_imu(imu));
+  } else {
+    odometry_.w_OB_B = imu.gyro_radps;
+  }
+}
 
 void Stack::add_autopilot(const AutopilotStatus& status) { autopilot_ = status; }
 
 void Stack::add_mocap(const MocapSample& mocap) {
   if (config_.odometry.source != OdometryConfig::Source::kMocap) return;
-  odometry_.stamp = odometry_.correction_stamp = mocap.stamp;
-  odometry_.X_OB = mocap.X_OB;
-  odometry_.v_OB = mocap.v_OB;
-  odometry_.status = OdometryStatus::kOk;
+  Odometry odometry = odometry_;
+  odometry.stamp = odometry.correction_stamp = mocap.stamp;
+  odometry.X_OB = mocap.X_OB;
+  odometry.v_OB = mocap.v_OB;
+  odometry.status = OdometryStatus::kOk;
+  set_odometry(odometry);
 }
 
-void Stack::add_scan(const LidarScanPtr& scan) { scan_ = scan; }
+void Stack::add_scan(const LidarScanPtr& scan) {
+  if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) return;
+  jobs_.start(odometry_lane_, now_, from_seconds(config_.odometry.latency_s),
+              [this, job = lidar_inertial_.prepare(scan)]() -> JobQueue::Delivery {
+                return [this, update = lidar_inertial_.correct(job)] {
+                  lidar_inertial_.apply(update);
+                  set_odometry(lidar_inertial_.odometry());
+                };
+              });
+}
 
 void Stack::add_depth(const DepthImagePtr& depth) { depth_ = depth; }
 
@@ -43,19 +62,27 @@ bool Stack::accepts_depth(Stamp stamp) {
   return true;
 }
 
-std::optional<AttitudeCommand> Stack::tick(Stamp now) {
-  now_ = now;
-  if (now < next_control_) return std::nullopt;
+std::optional<AttitudeCommand> Stack::tick() {
+  if (now_ < next_control_) return std::nullopt;
   next_control_ += control_period_;
   const MotionRequest request =
-      mission_.update({now, odometry_, autopilot_.ready, autopilot_.armed});
-  plan_motion(request, now);
-  return control(request, now);
+      mission_.update({now_, odometry_, autopilot_.ready, autopilot_.armed});
+  plan_motion(request);
+  return control(request);
+}
+
+void Stack::set_odometry(const Odometry& odometry) {
+  if (odometry.status != odometry_.status) {
+    events_.push_back(
+        {now_, EventKind::kOdometryStatus,
+         std::string(kOdometryStatusNames[static_cast<std::size_t>(odometry.status)])});
+  }
+  odometry_ = odometry;
 }
 
 std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }
 
-void Stack::plan_motion(const MotionRequest& request, Stamp now) {
+void Stack::plan_motion(const MotionRequest& request) {
   if (!(request == motion_)) {
     if (motion_.kind == MotionRequest::Kind::kNone) {
       path_ = TimedPath(config_.path, odometry_.X_OB.p, so3::yaw(odometry_.X_OB.R));
@@ -80,13 +107,13 @@ void Stack::plan_motion(const MotionRequest& request, Stamp now) {
     }
   }
   // The path begins once the autopilot follows: the spin-up is not flown.
-  if (path_start_ < 0 && autopilot_.follows) path_start_ = now;
-  setpoint_ = path_.sample(path_start_ < 0 ? 0.0 : to_seconds(now - path_start_));
+  if (path_start_ < 0 && autopilot_.follows) path_start_ = now_;
+  setpoint_ = path_.sample(path_start_ < 0 ? 0.0 : to_seconds(now_ - path_start_));
 }
 
-AttitudeCommand Stack::control(const MotionRequest& request, Stamp now) {
+AttitudeCommand Stack::control(const MotionRequest& request) {
   AttitudeCommand command;
-  command.stamp = now;
+  command.stamp = now_;
   if (request.kind == MotionRequest::Kind::kNone) return command;  // disarmed
   const TrackerOutput output = tracker_.update(setpoint_, odometry_, !autopilot_.landed);
   const Mat3 R_AO = heading_between(autopilot_.attitude.R_AB, odometry_.X_OB.R);

@@ -13,18 +13,26 @@
 #include "messages/events.h"
 #include "messages/sensors.h"
 #include "messages/vehicle.h"
+#include "odometry/lidar_inertial_odometry.h"
 #include "stack/job_queue.h"
 
 namespace arex {
 
 struct OdometryConfig {
-  enum class Source { kMocap };
-  friend constexpr std::array<std::string_view, 1> enum_names(Source) { return {"mocap"}; }
+  enum class Source { kLidarInertial, kMocap };
+  friend constexpr std::array<std::string_view, 2> enum_names(Source) {
+    return {"lidar_inertial", "mocap"};
+  }
 
-  Source source = Source::kMocap;
+  Source source = Source::kLidarInertial;
+  double latency_s = 0.020;  ///< modelled compute time of a scan update
+  LidarInertialConfig lidar_inertial;
 
   void fields(auto& f) {
     f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
+    f("latency_s", latency_s, "modelled compute time of a scan update");
+    f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
+    f.check(latency_s >= 0, "latency_s >= 0");
   }
 };
 
@@ -68,17 +76,20 @@ class Stack {
  public:
   Stack(const StackConfig& config, JobQueue& jobs);
 
+  /// Sets the clock: what is fed or delivered from here on happens at `now`.
+  void begin(Stamp now) { now_ = now; }
+
   void add_imu(const ImuSample& imu);                 ///< 200 Hz
   void add_autopilot(const AutopilotStatus& status);  ///< 200 Hz
   void add_mocap(const MocapSample& mocap);
   void add_scan(const LidarScanPtr& scan);  ///< 10 Hz
   void add_depth(const DepthImagePtr& depth);
-  /// Whether the frame exposed at `stamp` will be read; the driver drops the others. To be asked once
-  /// for each frame.
+  /// Whether the frame exposed at `stamp` will be read; the driver drops the others. To be asked
+  /// once for each frame.
   [[nodiscard]] bool accepts_depth(Stamp stamp);
 
   /// Runs what is due. @return the newest command when there is one, at 100 Hz.
-  std::optional<AttitudeCommand> tick(Stamp now);
+  std::optional<AttitudeCommand> tick();
 
   [[nodiscard]] const Odometry& odometry() const { return odometry_; }
   [[nodiscard]] const TrajectorySetpoint& setpoint() const { return setpoint_; }
@@ -87,14 +98,17 @@ class Stack {
   std::vector<Event> take_events();
 
  private:
-  void plan_motion(const MotionRequest& request, Stamp now);
-  AttitudeCommand control(const MotionRequest& request, Stamp now);
+  void set_odometry(const Odometry& odometry);
+  void plan_motion(const MotionRequest& request);
+  AttitudeCommand control(const MotionRequest& request);
 
   StackConfig config_;
   JobQueue& jobs_;
   std::vector<Event> events_;
   Stamp now_ = 0;
 
+  LidarInertialOdometry lidar_inertial_;
+  JobQueue::Lane odometry_lane_;
   Odometry odometry_;
   AutopilotStatus autopilot_;
   Mission mission_;
@@ -107,7 +121,6 @@ class Stack {
   Stamp control_period_;
   Stamp next_control_ = 0;
   Stamp next_depth_ = 0;
-  LidarScanPtr scan_;    ///< newest
   DepthImagePtr depth_;  ///< newest
 };
 

@@ -16,16 +16,19 @@
 
 namespace arex::sim {
 
-/// How long the devices take from measurement to delivery.
-struct DeviceLatencyConfig {
-  double lidar_s = 0.003;  ///< UDP packets and driver, after the frame's last firing (estimate)
-  double depth_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
+/// Which devices run, and how long they take from measurement to delivery. The depth camera runs
+/// when the stack reads it (mapping.use_depth).
+struct DeviceConfig {
+  bool lidar = true;
+  double lidar_latency_s = 0.003;  ///< network and driver, after the frame's last firing (estimate)
+  double depth_latency_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
 
   void fields(auto& f) {
-    f("lidar_s", lidar_s, "end of a frame to its delivery");
-    f("depth_s", depth_s, "exposure to delivery");
-    f.check(lidar_s >= 0, "lidar_s >= 0");
-    f.check(depth_s >= 0, "depth_s >= 0");
+    f("lidar", lidar, "fire the LiDAR");
+    f("lidar_latency_s", lidar_latency_s, "end of a LiDAR frame to its delivery");
+    f("depth_latency_s", depth_latency_s, "exposure of a depth frame to its delivery");
+    f.check(lidar_latency_s >= 0, "lidar_latency_s >= 0");
+    f.check(depth_latency_s >= 0, "depth_latency_s >= 0");
   }
 };
 
@@ -38,7 +41,7 @@ struct ScenarioConfig {
   ImuConfig imu;
   Mid360Config lidar;
   D430Config depth;
-  DeviceLatencyConfig device_latency;
+  DeviceConfig devices;
   AutopilotConfig autopilot;
   StackConfig stack;
 
@@ -49,9 +52,11 @@ struct ScenarioConfig {
     f("imu", imu, "the autopilot's sensors");
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
-    f("device_latency", device_latency, "measurement to delivery");
+    f("devices", devices, "which run, and how long they take");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
+    f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
+            "devices.lidar true, or odometry.source mocap");
   }
 };
 

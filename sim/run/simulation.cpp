@@ -65,6 +65,7 @@ Simulation::Simulation(const Scenario& scenario, int threads)
 Simulation::~Simulation() { jobs_.stop(); }
 
 bool Simulation::tick() {
+  stack_.begin(now_);
   fire_imu();
   fire_lidar();
   fire_depth();
@@ -93,6 +94,7 @@ void Simulation::fire_imu() {
 }
 
 void Simulation::fire_lidar() {
+  if (!config_.devices.lidar) return;
   lidar_part_.push_back(physics_.truth());
   if (now_ == 0 || now_ % kLidarPart != 0) return;
   // The parts of a frame are cast while the next ones are fired; all become visible with the frame.
@@ -107,7 +109,7 @@ void Simulation::fire_lidar() {
   }
   const bool complete = now_ == frame_end;
   jobs_.schedule(
-      lidar_lane_, frame_end + from_seconds(config_.device_latency.lidar_s),
+      lidar_lane_, frame_end + from_seconds(config_.devices.lidar_latency_s),
       [this, ticks = lidar_part_, frame = lidar_frame_, complete]() -> JobQueue::Delivery {
         const LidarScan part = lidar_.scan(ticks);
         const auto offset = static_cast<std::uint32_t>(part.stamp - frame->stamp);
@@ -136,7 +138,7 @@ void Simulation::fire_depth() {
   }
   const double fraction = now_ == stamp ? 1.0 : 1.0 - static_cast<double>(now_ - stamp) / kTick;
   const Pose X_WB = interpolate(previous_truth_.X_WB, physics_.truth().X_WB, fraction);
-  jobs_.schedule(depth_lane_, stamp + from_seconds(config_.device_latency.depth_s),
+  jobs_.schedule(depth_lane_, stamp + from_seconds(config_.devices.depth_latency_s),
                  [this, stamp, X_WB]() -> JobQueue::Delivery {
                    const DepthImagePtr frame = camera_->capture(stamp, X_WB);
                    return [this, frame, hash = hash_of(*frame)] {
@@ -154,7 +156,7 @@ void Simulation::run_stack() {
                           autopilot_.armed(), autopilot_.state() > AutopilotState::kSpinUp,
                           autopilot_.landed()});
   }
-  const auto command = stack_.tick(now_);
+  const auto command = stack_.tick();
   if (!command) return;
   autopilot_.command(*command);
   hash_.add({command->R_AB_desired.data(), 9});

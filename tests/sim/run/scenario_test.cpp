@@ -53,7 +53,7 @@ TEST(Scenario, ARecipeWithoutAFreeStartIsAnErrorAtItsLine) {
              "    start_radius_m: 0.5\n    tree_density_per_m2: 0.19\n");
   const Scenario scenario = load_scenario(folder / "bad.yaml", {}, {});
   try {
-    scenario.build_world();
+    static_cast<void>(scenario.build_world());
     FAIL() << "no error";
   } catch (const ConfigError& error) {
     const std::string what = error.what();

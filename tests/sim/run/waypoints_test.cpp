@@ -1,0 +1,58 @@
+#include <gtest/gtest.h>
+
+#include "run/simulation.h"
+
+namespace arex::sim {
+namespace {
+
+constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
+
+FlightResult fly(const std::vector<std::string>& overrides, std::uint64_t seed, int threads = 1) {
+  Simulation simulation(load_scenario(kWaypoints, overrides, seed), threads);
+  while (simulation.tick()) {
+  }
+  return simulation.finish();
+}
+
+void expect_good_flight(const FlightResult& result, std::uint64_t seed) {
+  EXPECT_EQ(result.outcome, Outcome::kSucceeded) << "seed " << seed << ": " << result.reason;
+  EXPECT_EQ(result.collisions, 0) << "seed " << seed;
+  ASSERT_EQ(result.targets.size(), 6u) << "seed " << seed;
+  for (const double miss : result.target_miss_m) EXPECT_LT(miss, 0.2) << "seed " << seed;
+  EXPECT_LT(result.tracking_rmse_m, 0.10) << "seed " << seed;
+  EXPECT_LT(result.landing_error_m, 0.3) << "seed " << seed;
+}
+
+// What the sensors see does not matter on the oracle's pose: only the flight itself is flown here.
+const std::vector<std::string> kFlightOnly{"odometry.source=mocap", "devices.lidar=false",
+                                           "mapping.use_depth=false"};
+
+TEST(Waypoints, AreFlownInTenForestsInCalmAir) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    expect_good_flight(fly(kFlightOnly, seed), seed);
+  }
+}
+
+TEST(Waypoints, AreFlownInTenForestsInWind) {
+  for (std::uint64_t seed = 11; seed <= 20; ++seed) {
+    auto overrides = kFlightOnly;
+    // 2 m/s from another side in each forest, with the gusts that belong to it.
+    const double direction = 2.4 * static_cast<double>(seed);
+    overrides.push_back("physics.wind.mean_mps=[" + std::to_string(2 * std::cos(direction)) + ", " +
+                        std::to_string(2 * std::sin(direction)) + ", 0]");
+    expect_good_flight(fly(overrides, seed), seed);
+  }
+}
+
+TEST(Waypoints, AreFlownWithEverySensorRunningAndTheEnergyAddsUp) {
+  const FlightResult result = fly({"odometry.source=mocap"}, 1, 2);
+  expect_good_flight(result, 1);
+  EXPECT_NE(result.renderer, "");
+  // 258 W in hover (models/arex); slow flight needs a little less, climbing and gusts a little
+  // more.
+  const double flown_s = to_seconds(result.duration) - 4;  // less what it stood before take-off
+  EXPECT_NEAR(result.battery.used_wh, 258 * flown_s / 3600, 0.08 * 258 * flown_s / 3600);
+}
+
+}  // namespace
+}  // namespace arex::sim

@@ -23,7 +23,7 @@ struct Mid360Config {
   double beam_half_angle_deg = 0.1;    ///< [E] half of 0.28 x 0.03 deg FWHM of the maker's siblings
                                        ///< (HAP, Mid-70), taken round
   double echo_separation_m = 0.75;     ///< [E] c/2 * 5 ns pulse
-  double merged_share = 0.25;          ///< [E] most receivers lock onto the stronger echo
+  double merged_share = 0.15;          ///< [E] most receivers lock onto the stronger echo
   double edge_step_m = 0.02;           ///< [E] smaller steps are surface, not edge
   double airframe_reflectivity = 0.1;  ///< [E] carbon plate, black propellers
   double rotor_solidity = 0.11;        ///< [E] two 2 cm blades in a 9-inch disc

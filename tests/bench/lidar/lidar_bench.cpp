@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "messages/vehicle.h"
+#include "physics/airframe.h"
 #include "sensors/mid360.h"
 #include "worlds/forest.h"
 
@@ -122,12 +123,8 @@ int main() {
   exact.noise_free = true;
   Mid360Config narrow;
   narrow.beam_half_angle_deg = 0;
-  const std::vector<worlds::CollisionShape> airframe{
-      {worlds::CollisionShape::Kind::kBox, {Mat3::Identity(), {0, 0, 0.02}}, {0.09, 0.06, 0.05}, 0},
-      {worlds::CollisionShape::Kind::kCapsule,
-       {so3::Exp({0, 1.5708, 0}) * so3::Exp({1.0472, 0, 0}), {0.05, 0.08, 0}},
-       {0.012, 0.09, 0},
-       1}};
+  // The vehicle's own, as the simulator hands it over; the LiDAR's housing holds its origin.
+  const std::vector<worlds::CollisionShape> airframe = load_airframe().shapes;
   const Mid360 lidar({}, scene, X_BL, airframe, 1);
   const Mid360 lidar_exact(exact, scene, X_BL, airframe, 1);
   const Mid360 lidar_narrow(narrow, scene, X_BL, airframe, 1);

@@ -38,6 +38,14 @@ struct PatternArguments {
 };
 int pattern(const PatternArguments& arguments);
 
+struct RenderArguments {
+  std::string folder;            ///< a run folder
+  std::string out;               ///< picture to write
+  std::string view = "chase";    ///< or top
+  std::optional<double> time_s;  ///< moment of the flight; default its middle
+};
+int render(const RenderArguments& arguments);
+
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);
 

@@ -46,6 +46,16 @@ void add_pattern(CLI::App& app, PatternArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = pattern(arguments); });
 }
 
+void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("render", "draw a recorded flight");
+  command->add_option("folder", arguments.folder, "run folder")->required();
+  command->add_option("--out", arguments.out, "PNG file to write")->required();
+  command->add_option("--view", arguments.view, "chase or top")
+      ->check(CLI::IsMember({"chase", "top"}));
+  command->add_option("--time", arguments.time_s, "moment of the flight, s; default its middle");
+  command->callback([&] { exit_code = render(arguments); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -55,11 +65,13 @@ int main(int argc, char** argv) {
   RunArguments run_arguments;
   WorldArguments world_arguments;
   PatternArguments pattern_arguments;
+  RenderArguments render_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   add_run(app, run_arguments, exit_code);
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
+  add_render(app, render_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });

@@ -13,6 +13,10 @@ worlds::World Scenario::build_world() const {
   }
 }
 
+Pose start_pose(const worlds::World& world, const VehicleConfig& vehicle) {
+  return world.X_WS * Pose{Mat3::Identity(), {0, 0, vehicle.ground_offset_m}};
+}
+
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
                        std::optional<std::uint64_t> seed) {
   Scenario scenario;

@@ -72,6 +72,9 @@ struct Scenario {
   [[nodiscard]] worlds::World build_world() const;
 };
 
+/// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
+Pose start_pose(const worlds::World& world, const VehicleConfig& vehicle);
+
 /// Reads a scenario, applies `--set` and `--seed`, checks everything. @throws ConfigError.
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
                        std::optional<std::uint64_t> seed);

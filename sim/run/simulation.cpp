@@ -14,11 +14,6 @@ constexpr Stamp kFlightPeriod = 50 * kTick;   // 20 Hz: flight.csv, clearance
 constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
 constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
 
-// The start pad is on the ground; B stands above it.
-Pose start_pose(const worlds::World& world, const VehicleConfig& vehicle) {
-  return world.X_WS * Pose{Mat3::Identity(), {0, 0, vehicle.ground_offset_m}};
-}
-
 std::vector<worlds::CollisionShape> airframe_without_lidar(const Airframe& airframe) {
   std::vector<worlds::CollisionShape> shapes;
   for (const auto& shape : airframe.shapes) {

@@ -9,7 +9,7 @@ namespace arex {
 namespace {
 
 constexpr double kImuHz = 1000;
-// The accelerometer is only read for support by the ground: slow is fine, vibration is not.
+// Support by the ground may come a little late, vibration must not come through.
 constexpr double kSupportCutoffHz = 10;
 // Of the autopilot's own descent: it never pushes and never falls.
 constexpr double kDescentThrustLow = 0.1, kDescentThrustHigh = 1.4;  // of the weight
@@ -27,7 +27,7 @@ Autopilot::Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle
       rate_control_(config.control),
       land_detector_(config.land, vehicle),
       gyro_filter_(kImuHz, config.control.gyro_cutoff_hz),
-      accel_filter_(kImuHz, kSupportCutoffHz),
+      support_filter_(kImuHz, kSupportCutoffHz),
       rate_period_(period_of(config.control.rate_loop_hz)),
       attitude_period_(period_of(config.control.attitude_loop_hz)),
       voltage_v_(config.motor.nominal_voltage_v) {}
@@ -35,7 +35,8 @@ Autopilot::Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle
 void Autopilot::add_imu(const ImuSample& imu) {
   ahrs_.add_imu(imu);
   rate_B_ = gyro_filter_.update(imu.gyro_radps) - ahrs_.gyro_bias();
-  accel_B_ = accel_filter_.update(imu.accel_mps2);
+  const double support = vehicle_.mass_kg * imu.accel_mps2.z() - rotor_thrust_n_;
+  support_n_ = support_filter_.update(Vec3(support, 0, 0)).x();
   last_imu_ = imu.stamp;
 }
 
@@ -79,6 +80,7 @@ void Autopilot::enter(AutopilotState state, Stamp now) {
     descent_integral_ = 0;
   }
   if (state == AutopilotState::kStandby) must_release_ = true;
+  if (landed()) contact_ = false;
   ahrs_.set_on_ground(landed());
 }
 
@@ -113,18 +115,23 @@ void Autopilot::update_state(Stamp now) {
       }
       return;
     case kFlying:
-    case kDescending: {
-      const LandDetector::Evidence evidence{rotor_thrust_n_, accel_B_.z(), ahrs_.velocity().z(),
-                                            rate_B_.norm()};
-      if (land_detector_.update(now, evidence)) {
-        enter(kStandby, now);
-      } else if (follow != (state_ == kFlying)) {
-        enter(follow ? kFlying : kDescending, now);
-      }
-      // On the ground the integrators would wind up against the feet.
-      if (land_detector_.contact(now)) rate_control_.reset(rate_B_);
+    case kDescending:
+      update_flight(now, follow);
       return;
-    }
+  }
+}
+
+void Autopilot::update_flight(Stamp now, bool follow) {
+  using enum AutopilotState;
+  const LandDetector::Stage stage = land_detector_.update(
+      now, {support_n_, thrust_setpoint_n_, ahrs_.velocity().z(), rate_B_.norm()});
+  contact_ = stage != LandDetector::Stage::kAirborne;
+  // The integrators would wind up against the feet.
+  if (contact_) rate_control_.reset(rate_B_);
+  if (stage == LandDetector::Stage::kLanded) {
+    enter(kStandby, now);
+  } else if (follow != (state_ == kFlying)) {
+    enter(follow ? kFlying : kDescending, now);
   }
 }
 
@@ -143,8 +150,12 @@ void Autopilot::update_targets(double dt) {
   Mat3 R_AB_desired = R_AB_descend_;
   double yaw_rate = 0;
   if (state_ == AutopilotState::kFlying) {
-    R_AB_desired = limit_tilt(command_.R_AB_desired, config_.control.tilt_limit_rad);
-    yaw_rate = command_.yaw_rate_radps;
+    if (contact_) {
+      R_AB_desired = so3::from_yaw(so3::yaw(ahrs_.R_AB()));
+    } else {
+      R_AB_desired = limit_tilt(command_.R_AB_desired, config_.control.tilt_limit_rad);
+      yaw_rate = command_.yaw_rate_radps;
+    }
     thrust_setpoint_n_ = command_.thrust_n;
   } else if (state_ == AutopilotState::kDescending) {
     thrust_setpoint_n_ = descent_thrust(dt);

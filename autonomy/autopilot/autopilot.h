@@ -29,10 +29,11 @@ enum class AutopilotState {
 ///
 ///   AttitudeCommand -> attitude P (250 Hz) -> rate PID (500 Hz) -> allocation -> thrust curve
 ///
-/// It arms on the first kAttitude command once its filter is initialised and the vehicle is nearly
-/// level; it disarms on touchdown, and then needs a kDisarmed command before it arms again. In
-/// flight kDisarmed is not obeyed but taken as kDescend: nobody stops the rotors of a flying
-/// vehicle.
+/// Feet on the ground it stays level whatever is commanded: leaning against wind or a position
+/// error it would tip over. It arms on the first kAttitude command once its filter is initialised
+/// and the vehicle is nearly level; it disarms on touchdown, and then needs a kDisarmed command
+/// before it arms again. In flight kDisarmed is not obeyed but taken as kDescend: nobody stops the
+/// rotors of a flying vehicle.
 class Autopilot {
  public:
   Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle);
@@ -54,10 +55,13 @@ class Autopilot {
   [[nodiscard]] bool armed() const { return state_ >= AutopilotState::kSpinUp; }
   /// Standing: not in the air as far as it knows.
   [[nodiscard]] bool landed() const { return state_ < AutopilotState::kFlying; }
+  /// Flying, but the ground carries a part of the weight: before lift-off, after touchdown.
+  [[nodiscard]] bool ground_contact() const { return contact_; }
   [[nodiscard]] const Ahrs& ahrs() const { return ahrs_; }
 
  private:
   void update_state(Stamp now);
+  void update_flight(Stamp now, bool follow);
   void enter(AutopilotState state, Stamp now);
   void update_targets(double dt);
   double descent_thrust(double dt);
@@ -72,7 +76,7 @@ class Autopilot {
   RateControl rate_control_;
   LandDetector land_detector_;
   LowPass gyro_filter_;
-  LowPass accel_filter_;
+  LowPass support_filter_;
   Stamp rate_period_;
   Stamp attitude_period_;
 
@@ -84,15 +88,16 @@ class Autopilot {
   Stamp last_imu_ = 0;
   Stamp battery_stamp_ = 0;
   double voltage_v_;
-  Vec3 rate_B_ = Vec3::Zero();   ///< filtered, bias removed
-  Vec3 accel_B_ = Vec3::Zero();  ///< filtered
+  Vec3 rate_B_ = Vec3::Zero();  ///< filtered, bias removed
+  double support_n_ = 0;        ///< filtered: what carries the vehicle besides its rotors
+  bool contact_ = false;        ///< feet on the ground though flying
 
   Mat3 R_AB_descend_ = Mat3::Identity();
   double descent_integral_ = 0;  ///< m/s^2
   Vec3 rate_setpoint_ = Vec3::Zero();
   double thrust_setpoint_n_ = 0;
-  double rotor_thrust_n_ = 0;  ///< collective, of the rotors as they lag behind the demand
-  double demanded_thrust_n_ = 0;
+  double rotor_thrust_n_ = 0;     ///< collective, of the rotors as they lag behind the demand
+  double demanded_thrust_n_ = 0;  ///< sum of the rotors' targets
   MotorCommand motors_;
 };
 

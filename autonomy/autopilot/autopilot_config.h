@@ -117,22 +117,28 @@ struct AttitudeControlConfig {
   }
 };
 
-/// Touchdown: thrust has been taken away and yet nothing falls.
+/// Touchdown, from what carries the weight.
 struct LandDetectorConfig {
-  double low_thrust_fraction = 0.5;  ///< of the weight
-  double support_fraction = 0.35;  ///< of the weight: specific force that the rotors don't explain
-  double still_speed_mps = 0.4;    ///< vertical
+  double contact_fraction = 0.2;     ///< of the weight: this much support means feet on the ground
+  double contact_s = 0.1;            ///< and must last
+  double support_fraction = 0.35;    ///< of the weight: support of a vehicle that has landed
+  double low_thrust_fraction = 0.5;  ///< of the weight: less demanded thrust ends the flight
+  double still_speed_mps = 0.4;      ///< vertical
   double still_rate_radps = 0.6;
   double persistence_s = 0.5;
 
   void fields(auto& f) {
-    f("low_thrust_fraction", low_thrust_fraction, "thrust below this part of the weight is low");
-    f("support_fraction", support_fraction, "part of the weight that something else carries");
+    f("contact_fraction", contact_fraction, "part of the weight carried by the ground: contact");
+    f("contact_s", contact_s, "how long contact must last");
+    f("support_fraction", support_fraction, "part of the weight carried by the ground: landed");
+    f("low_thrust_fraction", low_thrust_fraction, "demanded part of the weight: landed");
     f("still_speed_mps", still_speed_mps, "vertical speed below this is none");
     f("still_rate_radps", still_rate_radps, "body rate below this is none");
     f("persistence_s", persistence_s, "how long all of it must hold");
+    f.check(contact_fraction > 0 && contact_fraction < 1, "0 < contact_fraction < 1");
     f.check(low_thrust_fraction > 0 && low_thrust_fraction < 1, "0 < low_thrust_fraction < 1");
-    f.check(support_fraction > 0 && support_fraction < 1, "0 < support_fraction < 1");
+    f.check(support_fraction >= contact_fraction && support_fraction < 1,
+            "contact_fraction <= support_fraction < 1");
     f.check(persistence_s > 0, "persistence_s > 0");
   }
 };

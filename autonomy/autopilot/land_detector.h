@@ -7,40 +7,43 @@
 
 namespace arex {
 
-/// Touchdown from inside: the rotors carry only part of the weight, yet the accelerometer still
-/// reads gravity, so something else carries the rest. In free flight low thrust means falling.
+/// Touchdown from inside. What the accelerometer reads beyond the rotors' thrust is carried by
+/// something else: with no vertical motion, by the ground. That is contact. The vehicle has landed
+/// when, moreover, so little thrust is demanded for so long that in the air it would fall: half the
+/// weight for half a second is 2.5 m/s, whatever the thrust model's errors.
 class LandDetector {
  public:
-  LandDetector(const LandDetectorConfig& config, const VehicleConfig& vehicle)
-      : config_(config), weight_n_(vehicle.mass_kg * kGravity), mass_kg_(vehicle.mass_kg) {}
+  enum class Stage { kAirborne, kContact, kLanded };
 
   /// What it looks at, at one moment.
   struct Evidence {
-    double thrust_n = 0;             ///< collective, of the rotors as they turn
-    double specific_force_mps2 = 0;  ///< along B's z, without vibration
+    double support_n = 0;  ///< specific force along B's z times mass, less the rotors' thrust
+    double demanded_thrust_n = 0;
     double vertical_speed_mps = 0;
     double rate_radps = 0;  ///< norm of the body rate
   };
 
-  /// True once the evidence has held for the persistence.
-  bool update(Stamp now, const Evidence& evidence) {
-    const bool contact = evidence.thrust_n < config_.low_thrust_fraction * weight_n_ &&
-                         mass_kg_ * evidence.specific_force_mps2 - evidence.thrust_n >
-                             config_.support_fraction * weight_n_ &&
-                         std::abs(evidence.vertical_speed_mps) < config_.still_speed_mps &&
+  LandDetector(const LandDetectorConfig& config, const VehicleConfig& vehicle)
+      : config_(config), weight_n_(vehicle.mass_kg * kGravity) {}
+
+  Stage update(Stamp now, const Evidence& evidence) {
+    const bool contact = evidence.support_n > config_.contact_fraction * weight_n_ &&
+                         std::abs(evidence.vertical_speed_mps) < config_.still_speed_mps;
+    const bool resting = contact && evidence.support_n > config_.support_fraction * weight_n_ &&
+                         evidence.demanded_thrust_n < config_.low_thrust_fraction * weight_n_ &&
                          evidence.rate_radps < config_.still_rate_radps;
-    if (!contact) since_ = now;
-    return to_seconds(now - since_) >= config_.persistence_s;
+    if (!contact) airborne_ = now;
+    if (!resting) restless_ = now;
+    if (to_seconds(now - restless_) >= config_.persistence_s) return Stage::kLanded;
+    return to_seconds(now - airborne_) >= config_.contact_s ? Stage::kContact : Stage::kAirborne;
   }
-  void reset(Stamp now) { since_ = now; }
-  /// Whether the newest evidence speaks for contact.
-  [[nodiscard]] bool contact(Stamp now) const { return now > since_; }
+  void reset(Stamp now) { airborne_ = restless_ = now; }
 
  private:
   LandDetectorConfig config_;
   double weight_n_;
-  double mass_kg_;
-  Stamp since_ = 0;  ///< the newest moment without contact
+  Stamp airborne_ = 0;  ///< the newest moment without contact
+  Stamp restless_ = 0;  ///< the newest moment that does not look landed
 };
 
 }  // namespace arex

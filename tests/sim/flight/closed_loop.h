@@ -12,17 +12,19 @@
 
 namespace arex::sim::test {
 
-/// A flat floor of 100 x 100 m at z = 0.
-inline worlds::World flat_world() {
+/// A plane floor of 100 x 100 m through the origin that rises towards y.
+inline worlds::World plane_world(double slope_rad) {
   worlds::World world;
+  const Mat3 tilt = so3::Exp({slope_rad, 0, 0});
   world.objects.push_back({worlds::SurfaceClass::kGround, 0.3F});
   world.collision_shapes.push_back(
-      {worlds::CollisionShape::Kind::kBox, {Mat3::Identity(), {0, 0, -0.25}}, {50, 50, 0.25}, 0});
+      {worlds::CollisionShape::Kind::kBox, {tilt, tilt * Vec3(0, 0, -0.25)}, {50, 50, 0.25}, 0});
   return world;
 }
 
 /// Physics, sensors, autopilot and tracker in lockstep. The pose comes as a tracking system would
-/// give it; the attitude loop flies on the autopilot's own sensors. O is the starting pose.
+/// give it; the attitude loop flies on the autopilot's own sensors. O is the starting pose
+/// without its tilt.
 class ClosedLoop {
  public:
   struct Options {
@@ -31,12 +33,16 @@ class ClosedLoop {
     AutopilotConfig autopilot;
     TrackerConfig tracker;
     double start_yaw_rad = 0.5;
+    double ground_slope_rad = 0;
   };
 
   ClosedLoop(const Options& options, std::uint64_t seed)
-      : world_(flat_world()),
-        X_WO_{so3::from_yaw(options.start_yaw_rad), {0, 0, VehicleConfig{}.ground_offset_m}},
-        physics(options.physics, world_, X_WO_, seed),
+      : world_(plane_world(options.ground_slope_rad)),
+        X_WO_{so3::from_yaw(options.start_yaw_rad),
+              so3::Exp({options.ground_slope_rad, 0, 0}) *
+                  Vec3(0, 0, VehicleConfig{}.ground_offset_m)},
+        physics(options.physics, world_,
+                {so3::Exp({options.ground_slope_rad, 0, 0}) * X_WO_.R, X_WO_.p}, seed),
         imu(options.imu, seed),
         autopilot(options.autopilot, VehicleConfig{}),
         tracker(options.tracker, VehicleConfig{}) {}

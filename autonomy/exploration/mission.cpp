@@ -24,6 +24,7 @@ MotionRequest Mission::update(const Inputs& inputs) {
     events_(inputs.armed ? EventKind::kArmed : EventKind::kDisarmed, "");
     was_armed_ = inputs.armed;
   }
+  watch_odometry(inputs);
   switch (state_) {
     case MissionState::kInitialise:
       if (inputs.now >= from_seconds(config_.settle_s) && inputs.autopilot_ready &&
@@ -32,23 +33,21 @@ MotionRequest Mission::update(const Inputs& inputs) {
       }
       break;
     case MissionState::kTakeoff:
-      if (has_arrived(inputs)) {
-        enter(config_.waypoints_m.empty() ? MissionState::kLand : MissionState::kFly, inputs);
-      }
+      if (has_arrived(inputs)) enter(MissionState::kFly, inputs);
       break;
     case MissionState::kFly:
-      if (has_arrived(inputs)) {
-        targets_.push_back({request_.goal_O, inputs.now});
-        events_(EventKind::kTargetReached, describe(request_.goal_O));
-        if (waypoint_ + 1 < config_.waypoints_m.size()) {
-          select_waypoint(waypoint_ + 1);
-        } else {
-          enter(MissionState::kLand, inputs);
-        }
-      }
+      fly(inputs);
       break;
     case MissionState::kLand:
       if (!inputs.armed) enter(MissionState::kDone, inputs);
+      break;
+    case MissionState::kLost:
+      if (!inputs.armed) {
+        lost_ = true;
+        enter(MissionState::kDone, inputs);
+      } else if (inputs.now - lost_since_ >= from_seconds(config_.lost_hover_s)) {
+        request_ = {MotionRequest::Kind::kDescend, Vec3::Zero()};
+      }
       break;
     case MissionState::kDone:
       break;
@@ -56,8 +55,26 @@ MotionRequest Mission::update(const Inputs& inputs) {
   return request_;
 }
 
+void Mission::watch_odometry(const Inputs& inputs) {
+  const bool flying = inputs.armed && state_ != MissionState::kDone;
+  const bool missing = inputs.odometry.status == OdometryStatus::kLost;
+  if (flying && missing && state_ != MissionState::kLost) {
+    lost_since_ = inputs.now;
+    interrupted_ = state_;
+    interrupted_request_ = request_;
+    enter(MissionState::kLost, inputs);
+  } else if (state_ == MissionState::kLost && !missing &&
+             request_.kind == MotionRequest::Kind::kLevel) {
+    events_(EventKind::kRecovery, "odometry is back");
+    state_ = interrupted_;
+    request_ = interrupted_request_;
+    inside_since_ = -1;
+  }
+}
+
 void Mission::enter(MissionState state, const Inputs& inputs) {
   state_ = state;
+  state_since_ = inputs.now;
   inside_since_ = -1;
   events_(EventKind::kMissionState,
           std::string(kMissionStateNames[static_cast<std::size_t>(state)]));
@@ -67,14 +84,55 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
                   inputs.odometry.X_OB.p + config_.takeoff_height_m * Vec3::UnitZ()};
       break;
     case MissionState::kFly:
-      select_waypoint(0);
+      begin_flying();
       break;
     case MissionState::kLand:
       request_ = {MotionRequest::Kind::kLand, request_.goal_O};
       break;
+    case MissionState::kLost:
+      request_ = {MotionRequest::Kind::kLevel, Vec3::Zero()};
+      break;
     default:
       request_ = {};
   }
+}
+
+void Mission::begin_flying() {
+  if (config_.kind == MissionConfig::Kind::kWaypoints && !config_.waypoints_m.empty()) {
+    select_waypoint(0);
+  }
+}
+
+void Mission::fly(const Inputs& inputs) {
+  if (config_.kind == MissionConfig::Kind::kYawBurst) {
+    spin(inputs);
+  } else if (config_.waypoints_m.empty()) {
+    enter(MissionState::kLand, inputs);
+  } else if (has_arrived(inputs)) {
+    targets_.push_back({request_.goal_O, inputs.now});
+    events_(EventKind::kTargetReached, describe(request_.goal_O));
+    if (waypoint_ + 1 < config_.waypoints_m.size()) {
+      select_waypoint(waypoint_ + 1);
+    } else {
+      enter(MissionState::kLand, inputs);
+    }
+  }
+}
+
+// Each rate for a while, with as long a rest at zero rate after it.
+void Mission::spin(const Inputs& inputs) {
+  const Stamp phase = (inputs.now - state_since_) / from_seconds(config_.yaw_burst_s);
+  const auto burst = static_cast<std::size_t>(phase / 2);
+  if (burst >= config_.yaw_rates_radps.size()) {
+    enter(MissionState::kLand, inputs);
+    return;
+  }
+  const double rate = phase % 2 == 0 ? config_.yaw_rates_radps[burst] : 0.0;
+  if (request_.kind == MotionRequest::Kind::kSpin && request_.yaw_rate_radps == rate) return;
+  request_ = {MotionRequest::Kind::kSpin, request_.goal_O, rate};
+  std::array<char, 48> text{};
+  std::snprintf(text.data(), text.size(), "yaw rate %.2f rad/s", rate);
+  events_(EventKind::kTargetSelected, text.data());
 }
 
 void Mission::select_waypoint(std::size_t index) {

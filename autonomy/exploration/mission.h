@@ -8,14 +8,17 @@
 
 #include "messages/estimates.h"
 #include "messages/events.h"
+#include "messages/motion.h"
 
 namespace arex {
 
 /// What the vehicle is sent out to do. Positions are in O: origin where it stood at start-up, x its
 /// heading then, z up.
 struct MissionConfig {
-  enum class Kind { kWaypoints };
-  friend constexpr std::array<std::string_view, 1> enum_names(Kind) { return {"waypoints"}; }
+  enum class Kind { kWaypoints, kYawBurst };
+  friend constexpr std::array<std::string_view, 2> enum_names(Kind) {
+    return {"waypoints", "yaw_burst"};
+  }
 
   Kind kind = Kind::kWaypoints;
   std::vector<Vec3> waypoints_m;  ///< flown in order; the last is where it lands
@@ -25,6 +28,9 @@ struct MissionConfig {
   double hold_s = 0.5;             ///< and for this long
   double settle_s = 3.0;           ///< standing still before arming: sensors initialise
   double max_time_s = 600;
+  std::vector<double> yaw_rates_radps{1, 2, 3};  ///< of a yaw burst, one after the other
+  double yaw_burst_s = 4.0;                      ///< length of each
+  double lost_hover_s = 1.0;  ///< without odometry: level at hover thrust, then down
 
   void fields(auto& f) {
     f("kind", kind, "what the vehicle is sent out to do");
@@ -35,6 +41,12 @@ struct MissionConfig {
     f("hold_s", hold_s, "and for this long");
     f("settle_s", settle_s, "standing still before arming");
     f("max_time_s", max_time_s, "the mission fails when it is not over by then");
+    f("yaw_rates_radps", yaw_rates_radps, "of a yaw burst, one after the other");
+    f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
+    f("lost_hover_s", lost_hover_s,
+      "level at hover thrust without odometry, then the autopilot lands");
+    f.check(yaw_burst_s > 0, "yaw_burst_s > 0");
+    f.check(lost_hover_s >= 0, "lost_hover_s >= 0");
     f.check(takeoff_height_m > 0, "takeoff_height_m > 0");
     f.check(arrival_radius_m > 0, "arrival_radius_m > 0");
     f.check(arrival_speed_mps > 0, "arrival_speed_mps > 0");
@@ -44,24 +56,10 @@ struct MissionConfig {
   }
 };
 
-/// What the mission asks of the vehicle's motion until it asks something else.
-struct MotionRequest {
-  enum class Kind {
-    kNone,     ///< motors off
-    kTakeoff,  ///< straight up to `goal`
-    kGoTo,     ///< to `goal`, along whatever path the motion side finds
-    kLand,     ///< straight down until touchdown
-  };
-  Kind kind = Kind::kNone;
-  Vec3 goal_O = Vec3::Zero();
-
-  bool operator==(const MotionRequest&) const = default;
-};
-
 /// The mission's states, in order.
-enum class MissionState { kInitialise, kTakeoff, kFly, kLand, kDone };
-inline constexpr std::array<std::string_view, 5> kMissionStateNames{"initialise", "takeoff", "fly",
-                                                                    "land", "done"};
+enum class MissionState { kInitialise, kTakeoff, kFly, kLand, kLost, kDone };
+inline constexpr std::array<std::string_view, 6> kMissionStateNames{
+    "initialise", "takeoff", "fly", "land", "lost", "done"};
 
 /// A target that was flown to.
 struct MissionTarget {
@@ -87,11 +85,17 @@ class Mission {
   MotionRequest update(const Inputs& inputs);
 
   [[nodiscard]] MissionState state() const { return state_; }
+  /// Whether the odometry was lost for good: the mission ended where it stood.
+  [[nodiscard]] bool lost() const { return lost_; }
   [[nodiscard]] const std::vector<MissionTarget>& targets() const { return targets_; }
 
  private:
   void enter(MissionState state, const Inputs& inputs);
+  void begin_flying();
+  void fly(const Inputs& inputs);
   void select_waypoint(std::size_t index);
+  void spin(const Inputs& inputs);
+  void watch_odometry(const Inputs& inputs);
   bool has_arrived(const Inputs& inputs);
 
   MissionConfig config_;
@@ -101,6 +105,11 @@ class Mission {
   std::size_t waypoint_ = 0;
   Stamp inside_since_ = -1;  ///< when the vehicle came to rest within the goal's radius, -1: not
   bool was_armed_ = false;
+  Stamp state_since_ = 0;
+  Stamp lost_since_ = -1;  ///< -1: odometry is there
+  bool lost_ = false;
+  MissionState interrupted_ = MissionState::kFly;  ///< what goes on when the odometry is back
+  MotionRequest interrupted_request_;
   std::vector<MissionTarget> targets_;
 };
 

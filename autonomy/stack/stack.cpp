@@ -3,13 +3,6 @@
 #include <utility>
 
 namespace arex {
-namespace {
-
-// A landing aims this far below where it starts: touchdown ends it, wherever the ground is.
-constexpr double kLandingDepth = 100;
-
-}  // namespace
-
 Stack::Stack(const StackConfig& config, JobQueue& jobs)
     : config_(config),
       jobs_(jobs),
@@ -19,7 +12,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs)
                [this](EventKind kind, const std::string& detail) {
                  events_.push_back({now_, kind, detail});
                }),
-      path_(config.path, Vec3::Zero(), 0),
+      motion_(config.path, config.caution),
       tracker_(config.control, config.vehicle),
       control_period_(from_seconds(1 / config.control.rate_hz)) {}
 
@@ -67,7 +60,7 @@ std::optional<AttitudeCommand> Stack::tick() {
   next_control_ += control_period_;
   const MotionRequest request =
       mission_.update({now_, odometry_, autopilot_.ready, autopilot_.armed});
-  plan_motion(request);
+  setpoint_ = motion_.update(now_, request, odometry_, autopilot_.follows);
   return control(request);
 }
 
@@ -82,39 +75,24 @@ void Stack::set_odometry(const Odometry& odometry) {
 
 std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }
 
-void Stack::plan_motion(const MotionRequest& request) {
-  if (!(request == motion_)) {
-    if (motion_.kind == MotionRequest::Kind::kNone) {
-      path_ = TimedPath(config_.path, odometry_.X_OB.p, so3::yaw(odometry_.X_OB.R));
-      tracker_.reset();
-    } else {
-      path_ = TimedPath(config_.path, path_.end(), path_.end_yaw_rad());
-    }
-    motion_ = request;
-    path_start_ = -1;
-    switch (request.kind) {
-      case MotionRequest::Kind::kTakeoff:
-        path_.climb_to(request.goal_O.z());
-        break;
-      case MotionRequest::Kind::kGoTo:
-        path_.fly_to(request.goal_O);
-        break;
-      case MotionRequest::Kind::kLand:
-        path_.land_to(path_.end().z() - kLandingDepth);
-        break;
-      case MotionRequest::Kind::kNone:
-        break;
-    }
-  }
-  // The path begins once the autopilot follows: the spin-up is not flown.
-  if (path_start_ < 0 && autopilot_.follows) path_start_ = now_;
-  setpoint_ = path_.sample(path_start_ < 0 ? 0.0 : to_seconds(now_ - path_start_));
-}
-
 AttitudeCommand Stack::control(const MotionRequest& request) {
   AttitudeCommand command;
   command.stamp = now_;
-  if (request.kind == MotionRequest::Kind::kNone) return command;  // disarmed
+  switch (request.kind) {
+    case MotionRequest::Kind::kNone:
+      return command;  // disarmed
+    case MotionRequest::Kind::kDescend:
+      command.mode = AutopilotMode::kDescend;
+      return command;
+    case MotionRequest::Kind::kLevel:
+      tracker_.reset();
+      command.mode = AutopilotMode::kAttitude;
+      command.R_AB_desired = so3::from_yaw(so3::yaw(autopilot_.attitude.R_AB));
+      command.thrust_n = config_.vehicle.mass_kg * kGravity;
+      return command;
+    default:
+      break;
+  }
   const TrackerOutput output = tracker_.update(setpoint_, odometry_, !autopilot_.landed);
   const Mat3 R_AO = heading_between(autopilot_.attitude.R_AB, odometry_.X_OB.R);
   command.mode = AutopilotMode::kAttitude;

@@ -5,7 +5,6 @@
 #include <string_view>
 #include <vector>
 
-#include "control/timed_path.h"
 #include "control/tracker.h"
 #include "exploration/mission.h"
 #include "messages/commands.h"
@@ -15,6 +14,7 @@
 #include "messages/vehicle.h"
 #include "odometry/lidar_inertial_odometry.h"
 #include "stack/job_queue.h"
+#include "stack/leg_motion.h"
 
 namespace arex {
 
@@ -54,6 +54,7 @@ struct StackConfig {
   MappingConfig mapping;
   MissionConfig mission;
   TimedPathConfig path;
+  CautionConfig caution;
   TrackerConfig control;
 
   void fields(auto& f) {
@@ -62,6 +63,7 @@ struct StackConfig {
     f("mapping", mapping, "maps of the surroundings");
     f("mission", mission, "what to do");
     f("path", path, "timed paths along straight legs");
+    f("caution", caution, "answers to a weak odometry");
     f("control", control, "trajectory tracking");
   }
 };
@@ -99,7 +101,6 @@ class Stack {
 
  private:
   void set_odometry(const Odometry& odometry);
-  void plan_motion(const MotionRequest& request);
   AttitudeCommand control(const MotionRequest& request);
 
   StackConfig config_;
@@ -113,9 +114,7 @@ class Stack {
   AutopilotStatus autopilot_;
   Mission mission_;
 
-  MotionRequest motion_;  ///< the request that path_ serves
-  TimedPath path_;
-  Stamp path_start_ = -1;  ///< -1: not started
+  LegMotion motion_;
   TrajectorySetpoint setpoint_;
   Tracker tracker_;
   Stamp control_period_;

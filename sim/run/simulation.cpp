@@ -228,7 +228,11 @@ void Simulation::judge() {
     if (recorder_) recorder_->event({now_, EventKind::kCollision, detail.data()});
     end(Outcome::kCollided, std::string("hit ") + detail.data());
   } else if (stack_.mission().state() == MissionState::kDone) {
-    end(Outcome::kSucceeded, "mission done");
+    if (stack_.mission().lost()) {
+      end(Outcome::kLost, "no odometry");
+    } else {
+      end(Outcome::kSucceeded, "mission done");
+    }
   } else if (now_ >= from_seconds(config_.stack.mission.max_time_s)) {
     end(Outcome::kTimedOut, "mission.max_time_s is over");
   }

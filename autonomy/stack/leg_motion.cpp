@@ -1,0 +1,89 @@
+#include "stack/leg_motion.h"
+
+#include <algorithm>
+
+namespace arex {
+namespace {
+
+// A landing aims this far below where it starts: touchdown ends it, wherever the ground is.
+constexpr double kLandingDepth = 100;
+
+bool holds_position(MotionRequest::Kind kind) {
+  return kind != MotionRequest::Kind::kNone && kind != MotionRequest::Kind::kLevel &&
+         kind != MotionRequest::Kind::kDescend;
+}
+
+}  // namespace
+
+LegMotion::LegMotion(const TimedPathConfig& path, const CautionConfig& caution)
+    : path_config_(path), caution_(caution), path_(path, Vec3::Zero(), 0) {}
+
+TrajectorySetpoint LegMotion::update(Stamp now, const MotionRequest& request,
+                                     const Odometry& odometry, bool follows) {
+  if (!(request == request_)) plan(request, odometry);
+  // The path begins once the autopilot follows: the spin-up is not flown.
+  if (started_) {
+    advance_clock(now, odometry);
+  } else if (follows) {
+    started_ = true;
+  }
+  last_ = now;
+  return sample();
+}
+
+void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
+  if (!holds_position(request_.kind)) {
+    path_ = TimedPath(path_config_, odometry.X_OB.p, so3::yaw(odometry.X_OB.R));
+    spin_yaw_rad_ = spin_rate_radps_ = 0;
+    clock_rate_ = 1;
+  } else if (request.kind != MotionRequest::Kind::kSpin) {
+    path_ = TimedPath(path_config_, path_.end(), path_.end_yaw_rad() + spin_yaw_rad_);
+    spin_yaw_rad_ = spin_rate_radps_ = 0;
+  }
+  if (request.kind != MotionRequest::Kind::kSpin) {
+    started_ = false;
+    path_time_s_ = 0;
+  }
+  request_ = request;
+  switch (request.kind) {
+    case MotionRequest::Kind::kTakeoff:
+      path_.climb_to(request.goal_O.z());
+      break;
+    case MotionRequest::Kind::kGoTo:
+      path_.fly_to(request.goal_O);
+      break;
+    case MotionRequest::Kind::kLand:
+      path_.land_to(path_.end().z() - kLandingDepth);
+      break;
+    default:
+      break;
+  }
+}
+
+void LegMotion::advance_clock(Stamp now, const Odometry& odometry) {
+  const double dt = to_seconds(now - last_);
+  const bool degenerate = odometry.status == OdometryStatus::kDegenerate;
+  const double wanted = degenerate ? caution_.degenerate_speed_fraction : 1.0;
+  const double limit = caution_.change_per_s;
+  const double change = std::clamp((wanted - clock_rate_) / std::max(dt, 1e-3), -limit, limit);
+  clock_acceleration_ = change;
+  clock_rate_ += change * dt;
+  path_time_s_ += clock_rate_ * dt;
+
+  const double wanted_spin =
+      request_.kind == MotionRequest::Kind::kSpin ? request_.yaw_rate_radps : 0.0;
+  const double step = path_config_.max_yaw_acceleration_radps2 * dt;
+  spin_rate_radps_ += std::clamp(wanted_spin - spin_rate_radps_, -step, step);
+  spin_yaw_rad_ += spin_rate_radps_ * dt;
+}
+
+TrajectorySetpoint LegMotion::sample() const {
+  TrajectorySetpoint setpoint = path_.sample(path_time_s_);
+  setpoint.a_OB = clock_rate_ * clock_rate_ * setpoint.a_OB + clock_acceleration_ * setpoint.v_OB;
+  setpoint.v_OB *= clock_rate_;
+  setpoint.yaw_rad = so3::wrap(setpoint.yaw_rad + spin_yaw_rad_);
+  setpoint.yaw_rate_radps = setpoint.yaw_rate_radps * clock_rate_ + spin_rate_radps_;
+  return setpoint;
+}
+
+}  // namespace arex

@@ -136,7 +136,8 @@ std::vector<Vec3> LocalPlanner::random_path(const PlanRequest& request, int inde
 
 void LocalPlanner::optimise(std::vector<Vec3>& q, double dt, const Anchors& anchors,
                             const FitnessReference* reference, double collision_scale,
-                            const LbfgsConfig& budget, PlanDiagnostics& diagnostics) {
+                            double safe_distance_m, const LbfgsConfig& budget,
+                            PlanDiagnostics& diagnostics) {
   if (q.size() < 7) return;
   const FeasibilityLimits feasibility{
       {config_.max_speed_mps, config_.feasibility_threshold, config_.feasibility_junction},
@@ -155,7 +156,7 @@ void LocalPlanner::optimise(std::vector<Vec3>& q, double dt, const Anchors& anch
         std::copy(at.begin(), at.end(), q.begin() + 3);
         std::fill(gradient.begin(), gradient.end(), Vec3::Zero());
         double cost = smoothness_cost(q, dt, lambda_s, gradient);
-        cost += collision_cost(q, anchors, config_.safe_distance_m,
+        cost += collision_cost(q, anchors, safe_distance_m,
                                collision_scale * config_.weight_collision, gradient);
         cost += feasibility_cost(q, dt, feasibility, config_.weight_feasibility, gradient);
         if (reference) cost += fitness_cost(q, *reference, config_.weight_fitness, gradient);
@@ -171,6 +172,7 @@ void LocalPlanner::optimise(std::vector<Vec3>& q, double dt, const Anchors& anch
 std::optional<UniformBspline> LocalPlanner::rebound(const GridView& grid,
                                                     const PlanRequest& request,
                                                     const std::vector<Vec3>& path, double dt,
+                                                    double safe_distance_m,
                                                     PlanDiagnostics& diagnostics) {
   MotionLimits slower = limits(request);
   slower.max_speed_mps *= config_.initial_speed_share;
@@ -189,7 +191,8 @@ std::optional<UniformBspline> LocalPlanner::rebound(const GridView& grid,
     diagnostics.anchors_dropped += report.dropped;
     if (!detoured) break;
     std::vector<Vec3> q = spline.control_points();
-    optimise(q, dt, anchors, nullptr, collision_scale, config_.rebound, diagnostics);
+    optimise(q, dt, anchors, nullptr, collision_scale, safe_distance_m, config_.rebound,
+             diagnostics);
     ++diagnostics.rebounds;
     spline = UniformBspline(std::move(q), dt);
     collision_scale *= kCollisionGrowth;
@@ -216,7 +219,8 @@ std::optional<UniformBspline> LocalPlanner::refine(const GridView& grid,
   // The start's state is given, so its control points move with the knot span.
   const auto head = UniformBspline::boundary(request.start, dt);
   std::copy(head.begin(), head.end(), q.begin());
-  optimise(q, dt, Anchors(q.size()), &reference, 0.0, config_.refine, diagnostics);
+  optimise(q, dt, Anchors(q.size()), &reference, 0.0, config_.safe_distance_m, config_.refine,
+           diagnostics);
   diagnostics.reallocated = true;
   UniformBspline refined(std::move(q), dt);
   if (!within_limits(refined, request.start, limit) || first_collision(grid, refined)) {
@@ -355,18 +359,18 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
     diagnostics.stage = stage;
     return true;
   };
-  const auto attempt = [&](PlanStage stage, const std::vector<Vec3>& path, double knot_span) {
+  const auto attempt = [&](PlanStage stage, const std::vector<Vec3>& path, double safe_distance) {
     ++diagnostics.attempts;
-    const auto free = rebound(grid, request, path, knot_span, diagnostics);
+    const auto free = rebound(grid, request, path, dt, safe_distance, diagnostics);
     found_free |= free.has_value();
     return free && accept(stage, bring_within_limits(grid, *free, request, diagnostics));
   };
 
   if (request.previous && !request.previous->empty() &&
-      attempt(PlanStage::kPrevious, previous_path(request), dt)) {
+      attempt(PlanStage::kPrevious, previous_path(request), config_.safe_distance_m)) {
     return;
   }
-  if (attempt(PlanStage::kPolynomial, polynomial_path(request), dt)) return;
+  if (attempt(PlanStage::kPolynomial, polynomial_path(request), config_.safe_distance_m)) return;
 
   // The complete search: it gives the next initial path and decides whether there is a way at all.
   const AstarResult way = guide(grid, request.start.p, request.goal, diagnostics);
@@ -376,7 +380,9 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
   }
   const std::vector<Vec3> corners = shortcut(grid, way.path, kShortcutMargins[0]);
   const std::vector<Vec3> guided = round_corners(corners, config_.control_point_distance_m);
-  if (attempt(PlanStage::kGuided, guided, dt)) return;
+  // Where the first rungs failed it is tight: ask for less room.
+  const double tight = config_.tight_share * config_.safe_distance_m;
+  if (attempt(PlanStage::kGuided, guided, tight)) return;
   if (request.start.v.norm() > kAtRest || request.start.a.norm() > kAtRest) {
     auto joined = join_and_follow(grid, way.path, request.start, limit);
     if (accept(PlanStage::kPathFollowing, std::move(joined))) return;
@@ -385,14 +391,14 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
     return;
   }
   for (int i = 0; i < config_.random_starts; ++i) {
-    if (attempt(PlanStage::kRandom, random_path(request, i), dt)) return;
+    if (attempt(PlanStage::kRandom, random_path(request, i), tight)) return;
   }
   result.status = found_free ? PlanStatus::kRefineRejected : PlanStatus::kOptimiserFailed;
 }
 
 void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& request,
                                        PlanResult& result) {
-  const KnownPrefix prefix = known_free_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
+  const KnownPrefix prefix = known_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
   if (prefix.whole) return;
   const double braking = 0.8 * config_.max_acceleration_mps2;
   const auto cap = [&](double s) {

@@ -96,9 +96,10 @@ class LocalPlanner {
   [[nodiscard]] std::optional<UniformBspline> rebound(const GridView& grid,
                                                       const PlanRequest& request,
                                                       const std::vector<Vec3>& path, double dt,
+                                                      double safe_distance_m,
                                                       PlanDiagnostics& diagnostics);
   void optimise(std::vector<Vec3>& q, double dt, const Anchors& anchors,
-                const FitnessReference* reference, double collision_scale,
+                const FitnessReference* reference, double collision_scale, double safe_distance_m,
                 const LbfgsConfig& budget, PlanDiagnostics& diagnostics);
   [[nodiscard]] std::optional<UniformBspline> refine(const GridView& grid,
                                                      const UniformBspline& spline,

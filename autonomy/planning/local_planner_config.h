@@ -21,7 +21,8 @@ struct LocalPlannerConfig {
   double weight_collision = 0.5;    ///< lambda_c
   double weight_feasibility = 0.1;  ///< lambda_d
   double weight_fitness = 1.0;
-  double safe_distance_m = 0.5;         ///< s_f
+  double safe_distance_m = 0.5;  ///< s_f
+  double tight_share = 0.4;      ///< of s_f after the first rungs failed; tests/bench/planning
   double feasibility_threshold = 0.95;  ///< lambda of f
   double feasibility_junction = 1.5;    ///< c_j / c_m of f
   double weight_speed = 1.0;            ///< w_v
@@ -30,7 +31,7 @@ struct LocalPlannerConfig {
   double fitness_along_m2 = 25.0;       ///< a^2
   double fitness_across_m2 = 1.0;       ///< b^2
 
-  LbfgsConfig rebound{16, 80, 0.01};
+  LbfgsConfig rebound{16, 60, 0.01};
   LbfgsConfig refine{16, 80, 0.001};
   int max_rebounds = 6;
   int random_starts = 1;
@@ -66,6 +67,7 @@ struct LocalPlannerConfig {
     f("weight_feasibility", weight_feasibility, "lambda_d (paper)");
     f("weight_fitness", weight_fitness, "of keeping the shape in the refinement");
     f("safe_distance_m", safe_distance_m, "s_f, beyond the inflation (paper)");
+    f("tight_share", tight_share, "of safe_distance_m once the first initial paths failed");
     f("feasibility_threshold", feasibility_threshold, "lambda of f (paper)");
     f("feasibility_junction", feasibility_junction, "c_j over c_m of f (paper)");
     f("weight_speed", weight_speed, "w_v (paper)");
@@ -92,6 +94,7 @@ struct LocalPlannerConfig {
     f.check(max_speed_mps > 0, "max_speed_mps > 0");
     f.check(max_acceleration_mps2 > 0, "max_acceleration_mps2 > 0");
     f.check(control_point_distance_m > 0, "control_point_distance_m > 0");
+    f.check(tight_share > 0 && tight_share <= 1, "0 < tight_share <= 1");
     f.check(safe_distance_m > 0, "safe_distance_m > 0");
     f.check(feasibility_threshold < feasibility_junction,
             "feasibility_threshold < feasibility_junction");

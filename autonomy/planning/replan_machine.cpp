@@ -6,6 +6,7 @@
 
 #include "math/so3.h"
 #include "planning/curve_check.h"
+#include "planning/free_space.h"
 #include "planning/guide_path.h"
 #include "planning/path_timing.h"
 #include "planning/stopping.h"
@@ -14,6 +15,7 @@ namespace arex {
 namespace {
 
 constexpr double kAtRest_mps = 0.05;
+constexpr double kClearanceStep_s = 0.05;
 constexpr double kGridMargin_m = 0.25;  ///< local targets stay this far inside the grid
 /// Shares of the horizon tried for a local target that cannot be reached.
 constexpr double kShorter[] = {1.0, 0.6, 0.35};
@@ -200,7 +202,7 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
   }
   const double t = std::max(0.0, current_.time(now));
   const MotionState here = current_.state(now);
-  const auto collision = first_collision(grid, current_.spline, t);
+  const auto collision = next_collision(grid, t);
   const bool blind = must_replan_for_space(grid, now);
   const double flown = (here.p - current_.spline.position(0)).norm();
   const double left = (here.p - *target_).norm();
@@ -221,13 +223,28 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
   enter(ReplanState::kExecTraj, now);
 }
 
+/// When the trajectory next meets blocked cells. Inflation that has grown over the vehicle does not
+/// count if the trajectory leaves it soon and the true radius stays free until then: stopping
+/// inside would be worse.
+std::optional<double> ReplanMachine::next_collision(const GridView& grid, double t_s) const {
+  const double radius = planner_.config().true_radius_m;
+  for (const TimeInterval& stretch : find_collisions(grid, current_.spline, t_s)) {
+    bool leaves = stretch.begin_s <= t_s && stretch.end_s < t_s + config_.emergency_time_s;
+    for (double t = stretch.begin_s; leaves && t <= stretch.end_s; t += kClearanceStep_s) {
+      leaves = clearance(grid, current_.spline.position(t), radius) >= radius;
+    }
+    if (!leaves) return stretch.begin_s;
+  }
+  return std::nullopt;
+}
+
 bool ReplanMachine::must_replan_for_space(const GridView& grid, Stamp now) const {
   const LocalPlannerConfig& planner = planner_.config();
   if (!planner.stop_in_known_space) return false;
   const double speed = current_.state(now).v.norm();
   if (speed <= planner.unknown_speed_mps * (1 + planner.limit_tolerance)) return false;
-  const KnownPrefix prefix = known_free_prefix(
-      grid, current_.spline, std::max(0.0, current_.time(now)), planner.true_radius_m);
+  const KnownPrefix prefix =
+      known_prefix(grid, current_.spline, std::max(0.0, current_.time(now)), planner.true_radius_m);
   const double reaction = config_.planning_latency_s + 1.0 / config_.check_rate_hz;
   return !prefix.whole &&
          prefix.length_m < stopping_distance(speed, planner.max_acceleration_mps2, reaction);
@@ -264,7 +281,8 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
     last_plan_ = planner_.plan(grid, request);
     const bool shorter_helps = last_plan_.status == PlanStatus::kNoPath ||
                                last_plan_.status == PlanStatus::kGoalInInflation;
-    if (last_plan_.ok() || final_target || !shorter_helps) break;
+    // In flight the next tick is soon enough, and the trajectory in force still good.
+    if (last_plan_.ok() || final_target || !shorter_helps || !from_rest) break;
   }
   if (!last_plan_.ok()) {
     ++failures_;

@@ -165,6 +165,7 @@ class ReplanMachine {
   void give_up(StuckCause cause, Stamp now);
   [[nodiscard]] MotionState state_at(Stamp stamp, const Odometry& odometry) const;
   [[nodiscard]] Vec3 local_target(const GridView& grid, const Vec3& from, double horizon_m) const;
+  [[nodiscard]] std::optional<double> next_collision(const GridView& grid, double t_s) const;
   [[nodiscard]] bool must_replan_for_space(const GridView& grid, Stamp now) const;
 
   ReplanConfig config_;

@@ -71,8 +71,8 @@ double stoppable_speed(double distance, double braking, double reaction_s) {
   return std::sqrt(b * b + 2 * braking * distance) - b;
 }
 
-KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline, double from_s,
-                              double own_radius_m) {
+KnownPrefix known_prefix(const GridView& grid, const UniformBspline& spline, double from_s,
+                         double own_radius_m) {
   KnownPrefix prefix{from_s, 0.0, false};
   const double dt = spline.knot_span_s();
   double t = std::clamp(from_s, 0.0, spline.duration_s());
@@ -84,7 +84,9 @@ KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline
     const double next =
         std::min({t + 0.25 * grid.resolution_m / speed, t + 0.25 * dt, spline.duration_s()});
     const Vec3 q = spline.position(next);
-    if (grid.inflated(q) || (!grid.known(q) && (q - start).norm() > own_radius_m)) return prefix;
+    const std::uint8_t flags = grid.at(q);
+    const bool known = (flags & GridView::kKnown) != 0 || (q - start).norm() <= own_radius_m;
+    if (!known || (flags & GridView::kOccupied) != 0) return prefix;
     prefix.length_m += (q - p).norm();
     prefix.end_s = t = next;
     p = q;

@@ -15,16 +15,16 @@ namespace arex {
 /// The inverse: the highest speed (m/s) from which `distance_m` suffices to stop.
 [[nodiscard]] double stoppable_speed(double distance_m, double braking_mps2, double reaction_s);
 
-/// The longest safe prefix of a spline: from `from_s` on, everything before it is known and free.
-/// What lies within `own_radius_m` of where it begins is the vehicle's own place and counts as
-/// known.
+/// The longest prefix of a spline, from `from_s` on, that lies in known cells without obstacles;
+/// whether it is also outside the inflation is first_collision's question. What lies within
+/// `own_radius_m` of where it begins is the vehicle's own place and counts as known.
 struct KnownPrefix {
   double end_s = 0;     ///< time on the spline
   double length_m = 0;  ///< arc length from from_s
   bool whole = false;   ///< nothing unknown up to the end
 };
-[[nodiscard]] KnownPrefix known_free_prefix(const GridView& grid, const UniformBspline& spline,
-                                            double from_s, double own_radius_m);
+[[nodiscard]] KnownPrefix known_prefix(const GridView& grid, const UniformBspline& spline,
+                                       double from_s, double own_radius_m);
 
 /// The shortest motion to rest straight on, at the acceleration limit.
 [[nodiscard]] UniformBspline brake(const MotionState& state, const MotionLimits& limits,

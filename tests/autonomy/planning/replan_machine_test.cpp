@@ -175,6 +175,21 @@ TEST(ReplanMachine, EscapesFromAnInflationThatGrowsOverIt) {
   EXPECT_FALSE(flight.occupied_);
 }
 
+TEST(ReplanMachine, FliesOnOutOfAnInflationThatGrazesIt) {
+  test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {1.05, 4.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({14.0, 4.05, 1.05}, {}, flight.now_);
+  while (flight.last_.p_OB.x() < 5.0) flight.step(grid.view());
+  const int x = static_cast<int>(flight.last_.p_OB.x() / 0.1);
+  grid.add_obstacle({x, 45, 0}, {x + 1, 47, 19}, 5);  // 0.45 m aside: inside 0.5, outside 0.3
+  ASSERT_TRUE(grid.view().inflated(flight.last_.p_OB));
+  flight.run(grid.view(), 60);
+  EXPECT_EQ(flight.count(PlannerEventKind::kEmergencyStop), 0);
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+}
+
 TEST(ReplanMachine, HoldsWhenOdometryIsLost) {
   const test::TestGrid grid(160, 80, 20);
   ReplanMachine machine = make_machine();

@@ -63,11 +63,11 @@ TEST(Stopping, KnownPrefixEndsAtTheFirstUnknownCell) {
   std::vector<Vec3> q;
   for (int i = 0; i < 20; ++i) q.push_back({0.75 + 0.25 * i, 1.05, 1.05});
   const UniformBspline s(q, 0.2);
-  const KnownPrefix prefix = known_free_prefix(grid.view(), s, 0.0, 0.3);
+  const KnownPrefix prefix = known_prefix(grid.view(), s, 0.0, 0.3);
   EXPECT_FALSE(prefix.whole);
   EXPECT_NEAR(s.position(prefix.end_s).x(), 3.3, 0.03);
   EXPECT_NEAR(prefix.length_m, 2.3, 0.03);
-  EXPECT_EQ(known_free_prefix(grid.view(), s, 0.0, 0.0).length_m, 0.0);
+  EXPECT_EQ(known_prefix(grid.view(), s, 0.0, 0.0).length_m, 0.0);
 }
 
 }  // namespace

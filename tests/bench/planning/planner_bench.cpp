@@ -1,6 +1,9 @@
 /// Random pillar fields of reference.md, section 10: success, limits and time of the local planner.
 ///
-///     planner_bench [cases per setting] [seed] [verbose]
+///     planner_bench [cases per setting] [seed] [folder]
+///
+/// With a folder each failed or slow case is listed, and failed ones and the first few are written
+/// there: the grid's middle layer, then the flown points.
 ///
 /// A case counts as solved when the planner says ok and the trajectory, checked every 1 ms to its
 /// very end, touches no inflated cell; the denominator is the cases that a complete 3D A* (26-
@@ -26,6 +29,8 @@ using namespace arex;
 
 constexpr double kDistance_m = 7.5;
 constexpr double kCruise_mps = 1.5;
+constexpr int kShown = 6;         ///< first cases written in any event
+constexpr double kSlow_ms = 8.0;  ///< listed
 
 double cpu_seconds() {
   timespec now{};
@@ -62,8 +67,9 @@ bool can_brake_straight(const GridView& grid, const support::PillarCase& drawn,
   return true;
 }
 
-void dump(const support::PillarField& field, const UniformBspline& spline, const char* name) {
-  if (std::FILE* file = std::fopen(name, "w")) {
+void dump(const support::PillarField& field, const UniformBspline& spline,
+          const std::string& name) {
+  if (std::FILE* file = std::fopen(name.c_str(), "w")) {
     const GridView grid = field.view();
     std::fprintf(file, "%d %d %g\n", grid.size.x(), grid.size.y(), grid.resolution_m);
     for (int x = 0; x < grid.size.x(); ++x) {
@@ -80,7 +86,9 @@ void dump(const support::PillarField& field, const UniformBspline& spline, const
   }
 }
 
-void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t seed, bool verbose) {
+void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t seed,
+         const std::string& folder) {
+  const bool verbose = !folder.empty();
   LocalPlannerConfig config;
   LocalPlanner planner(config);
   GridAstar oracle;
@@ -125,23 +133,20 @@ void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t se
     (doomed ? tally.doomed_solved : tally.solved) += solved;
     ++tally.stages[to_string(result.diagnostics.stage)];
     if (!solved && !doomed) ++tally.failures[touched ? "touched" : to_string(result.status)];
-    if (verbose && ((!solved && !doomed) || ms > 8)) {
+    if (verbose && ((!solved && !doomed) || ms > kSlow_ms)) {
       const PlanDiagnostics& d = result.diagnostics;
       std::printf(
           "  case %d: %s stage %s %.2f ms attempts %d rebounds %d it %d ev %d astar %d/%d\n", i,
           std::string(to_string(result.status)).c_str(), std::string(to_string(d.stage)).c_str(),
           ms, d.attempts, d.rebounds, d.iterations, d.evaluations, d.astar_searches,
           d.astar_expansions);
-      if (!solved) {
-        dump(field,
-             result.ok() ? result.trajectory
-                         : UniformBspline({drawn.start, drawn.start, drawn.start, drawn.goal,
-                                           drawn.goal, drawn.goal},
-                                          1.0),
-             ("/tmp/planner_case_" + std::to_string(pillars) + (cruise ? "c" : "r") + "_" +
-              std::to_string(i) + ".txt")
-                 .c_str());
-      }
+    }
+    if (verbose && (i < kShown || (!solved && !doomed))) {
+      const UniformBspline line(
+          {drawn.start, drawn.start, drawn.start, drawn.goal, drawn.goal, drawn.goal}, 1.0);
+      dump(field, result.ok() ? result.trajectory : line,
+           folder + "/" + std::to_string(pillars) + "_" + std::to_string(inflation).substr(0, 3) +
+               (cruise ? "_cruise_" : "_rest_") + std::to_string(i) + ".txt");
     }
   }
   std::sort(tally.ms.begin(), tally.ms.end());
@@ -169,11 +174,11 @@ void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t se
 int main(int argc, char** argv) {
   const int cases = argc > 1 ? std::atoi(argv[1]) : 500;
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  const bool verbose = argc > 3;
+  const std::string folder = argc > 3 ? argv[3] : "";
   for (const bool cruise : {false, true}) {
     for (const int pillars : {90, 180}) {
       for (const double inflation : {0.3, 0.5})
-        run(pillars, inflation, cruise, cases, seed, verbose);
+        run(pillars, inflation, cruise, cases, seed, folder);
     }
   }
 }

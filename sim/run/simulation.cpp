@@ -192,15 +192,17 @@ void Simulation::record() {
 void Simulation::score_tick() {
   const Truth& truth = physics_.truth();
   const Odometry& odometry = stack_.odometry();
-  const Pose X_OB_true = true_pose_in_O();
   const bool flying = !autopilot_.landed();
   if (odometry.status == OdometryStatus::kLost) odometry_lost_s_ += to_seconds(kEstimatePeriod);
   if (odometry.status != OdometryStatus::kInitialising && odometry.stamp == now_) {
+    // The stack's O is where its odometry began; truth is compared in that frame from then on.
+    if (pose_pairs_.empty()) X_OW_ = odometry.X_OB * truth.X_WB.inverse();
     pose_pairs_.push_back({now_, truth.X_WB, odometry.X_OB});
-    const Vec3 aligned = (align_at_start(pose_pairs_) * odometry.X_OB).p;
-    odometry_error_m_ = (aligned - truth.X_WB.p).norm();
     if (recorder_) recorder_->estimate(now_, odometry.X_OB);
   }
+  if (pose_pairs_.empty()) return;
+  const Pose X_OB_true = true_pose_in_O();
+  const double odometry_error = (pose_pairs_.back().X_OB.p - X_OB_true.p).norm();
   const double tracking_error = flying ? (X_OB_true.p - stack_.setpoint().p_OB).norm() : 0.0;
   if (flying && stack_.mission().state() != MissionState::kLand) {
     tracking_sum_ += tracking_error * tracking_error;
@@ -213,7 +215,7 @@ void Simulation::score_tick() {
   }
   if (!recorder_) return;
   const BatteryState& battery = physics_.battery();
-  recorder_->flight({now_, truth.v_WB.norm(), tracking_error, odometry_error_m_, last_clearance_m_,
+  recorder_->flight({now_, truth.v_WB.norm(), tracking_error, odometry_error, last_clearance_m_,
                      X_OB_true.p.z(), battery.voltage_v, battery.voltage_v * battery.current_a,
                      battery.state_of_charge});
 }

@@ -88,7 +88,8 @@ class Simulation {
   worlds::World world_;
   Scene scene_;
   Physics physics_;
-  Pose X_OW_;  ///< for scoring and the mocap oracle; the stack never sees it
+  Pose X_OW_;  ///< for scoring and the mocap oracle; the stack never sees it. O as the stack began
+               ///< it
   ImuModel imu_;
   Mid360 lidar_;
   std::unique_ptr<D430> camera_;  ///< made when the first frame is read
@@ -109,7 +110,6 @@ class Simulation {
   ClearanceMeter clearance_;
   double last_clearance_m_ = 0;
   std::vector<PosePair> pose_pairs_;
-  double odometry_error_m_ = 0;
   double odometry_lost_s_ = 0;
   double distance_m_ = 0;
   double tracking_sum_ = 0;

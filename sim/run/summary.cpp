@@ -37,6 +37,7 @@ ordered_json odometry_json(const Scenario& scenario, const FlightResult& result)
           {"ate_max_m", rounded(score.ate_max_m)},
           {"ate_se3_rmse_m", rounded(score.ate_se3_rmse_m)},
           {"yaw_error_max_deg", rounded(score.yaw_error_max_deg)},
+          {"start_tilt_deg", rounded(score.start_tilt_deg)},
           {"rpe_1m_m", rounded(score.rpe_1m_m)},
           {"rpe_10m_m", rounded(score.rpe_10m_m)},
           {"lost_s", rounded(result.odometry_lost_s)}};

@@ -63,6 +63,8 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
   score.ate_rmse_m = std::sqrt(sum_start / count);
   score.ate_se3_rmse_m = std::sqrt(sum_best / count);
   score.yaw_error_max_deg = yaw_max * 180 / std::numbers::pi;
+  score.start_tilt_deg =
+      std::acos(std::clamp(X_WO_start.R(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
   score.rpe_1m_m = relative_error(pairs, 1.0);
   score.rpe_10m_m = relative_error(pairs, 10.0);
   return score;

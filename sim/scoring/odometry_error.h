@@ -21,6 +21,7 @@ struct OdometryScore {
   double ate_max_m = 0;          ///< its largest value
   double ate_se3_rmse_m = 0;     ///< after the best rigid alignment of the whole run
   double yaw_error_max_deg = 0;  ///< heading error, aligned at the first pose
+  double start_tilt_deg = 0;     ///< how far O's z axis lies from the vertical: gravity at start-up
   double rpe_1m_m = 0;           ///< relative position error over 1 m of path, RMS
   double rpe_10m_m = 0;          ///< the same over 10 m; 0 if the path is shorter
 };

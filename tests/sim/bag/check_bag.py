@@ -1,0 +1,196 @@
+"""Reads our bags with Debian's rosbag and compares every value with the formulas of sample_data.h.
+
+Usage: check_bag.py WRITE_BAG
+"""
+
+import filecmp
+import math
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+
+import genpy.dynamic
+import rosbag
+import roslib.message
+
+EPOCH = 1_000_000_000
+IMU, SCAN, DEPTH = 5_000_000, 100_000_000, 33_333_333
+POINT = struct.Struct("<ffffIBB")
+FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("intensity", 12, 7, 1),
+          ("offset_time", 16, 6, 1), ("line", 20, 2, 1), ("tag", 21, 2, 1)]
+TOPICS = {"/imu/data": ("sensor_msgs/Imu", 200), "/livox/lidar": ("sensor_msgs/PointCloud2", 10),
+          "/truth": ("nav_msgs/Odometry", 200), "/camera/depth": ("sensor_msgs/Image", 3),
+          "/camera/camera_info": ("sensor_msgs/CameraInfo", 3),
+          "/tf_static": ("tf2_msgs/TFMessage", 1)}
+
+
+def expect(actual, wanted, what):
+    if actual != wanted:
+        sys.exit(f"{what}: {actual!r}, expected {wanted!r}")
+
+
+def xyz(v):
+    return (v.x, v.y, v.z)
+
+
+def check_header(header, index, stamp, frame, what):
+    expect((header.seq, header.stamp.to_nsec(), header.frame_id), (index, stamp + EPOCH, frame),
+           what)
+
+
+def check_imu(i, time, m):
+    check_header(m.header, i, i * IMU, "base_link", f"imu {i}")
+    expect(time, i * IMU + EPOCH, f"imu {i} recorded")
+    expect(xyz(m.angular_velocity), (0.25 * i, -0.5 * i, 1.0 + i), f"gyro {i}")
+    expect(xyz(m.linear_acceleration), (0.125, -0.0625 * i, 9.75 + i), f"accel {i}")
+    expect((m.orientation.w,) + xyz(m.orientation), (1, 0, 0, 0), f"orientation {i}")
+    expect(m.orientation_covariance, (-1,) + 8 * (0,), f"orientation covariance {i}")
+    expect(m.angular_velocity_covariance + m.linear_acceleration_covariance, 18 * (0,),
+           f"imu covariance {i}")
+
+
+def check_scan(i, time, m):
+    check_header(m.header, i, i * SCAN, "livox_frame", f"scan {i}")
+    expect(time, (i + 1) * SCAN + EPOCH, f"scan {i} recorded")
+    count = 0 if i == 9 else 20_000 - i
+    expect((m.height, m.width, m.point_step, m.row_step, len(m.data)),
+           (1, count, 22, 22 * count, 22 * count), f"scan {i} size")
+    expect((m.is_bigendian, m.is_dense), (False, True), f"scan {i} flags")
+    expect([(f.name, f.offset, f.datatype, f.count) for f in m.fields], FIELDS, f"scan {i} fields")
+    for k, point in enumerate(POINT.iter_unpack(m.data)):
+        expect(point, (0.25 * k, -i, 0.5 - k, k % 256, 5000 * k, k % 4, k % 17),
+               f"scan {i} point {k}")
+
+
+def check_truth(i, time, m):
+    check_header(m.header, i, i * IMU, "odom", f"truth {i}")
+    expect(time, i * IMU + EPOCH, f"truth {i} recorded")
+    expect(m.child_frame_id, "base_link", f"truth {i} child")
+    expect(xyz(m.pose.pose.position), (0.5 * i, -0.25 * i, 1.5), f"position {i}")
+    q = m.pose.pose.orientation
+    for actual, wanted in zip((q.x, q.y, q.z, q.w), (0, 0, math.sqrt(0.5), math.sqrt(0.5))):
+        if abs(actual - wanted) > 1e-15:
+            sys.exit(f"orientation {i}: {q}")
+    # B's x lies along O's y, its y against O's x.
+    expect(xyz(m.twist.twist.linear), (2.0, -i, -0.5), f"velocity {i}")
+    expect(xyz(m.twist.twist.angular), (0.5, 0.25 * i, -3), f"rate {i}")
+    expect(m.pose.covariance + m.twist.covariance, 72 * (0,), f"truth covariance {i}")
+
+
+def check_depth(i, time, m):
+    check_header(m.header, i, i * DEPTH, "camera_depth_optical_frame", f"depth {i}")
+    expect(time, i * DEPTH + EPOCH, f"depth {i} recorded")
+    expect((m.width, m.height, m.encoding, m.is_bigendian, m.step, len(m.data)),
+           (8, 6, "32FC1", 0, 32, 192), f"depth {i} layout")
+    for k, (z,) in enumerate(struct.iter_unpack("<f", m.data)):
+        wanted = 0.125 * (k + i)
+        if k % 5 == i or wanted == 0:
+            expect(math.isnan(z), True, f"depth {i} pixel {k} unmeasured")
+        else:
+            expect(z, wanted, f"depth {i} pixel {k}")
+
+
+def check_camera_info(i, time, m):
+    check_header(m.header, i, i * DEPTH, "camera_depth_optical_frame", f"camera info {i}")
+    expect(time, i * DEPTH + EPOCH, f"camera info {i} recorded")
+    expect((m.width, m.height, m.distortion_model, m.D), (8, 6, "plumb_bob", 5 * (0,)), "camera")
+    expect(m.K, (4.5, 0, 3.5, 0, 4.25, 2.75, 0, 0, 1), "camera K")
+    expect(m.R, (1, 0, 0, 0, 1, 0, 0, 0, 1), "camera R")
+    expect(m.P, (4.5, 0, 3.5, 0, 0, 4.25, 2.75, 0, 0, 0, 1, 0), "camera P")
+    expect((m.binning_x, m.binning_y, m.roi.x_offset, m.roi.y_offset, m.roi.height, m.roi.width,
+            m.roi.do_rectify), (0, 0, 0, 0, 0, 0, False), "camera binning and region")
+
+
+def check_tf(_, time, m):
+    expect(time, EPOCH, "tf recorded")
+    # models/arex: the LiDAR leans forward by 45 degrees; the camera looks ahead.
+    mounts = [("livox_frame", (0.15, 0, 0.01),
+               (0, math.sin(math.pi / 8), 0, math.cos(math.pi / 8))),
+              ("camera_depth_optical_frame", (0.14, 0, 0.07), (-0.5, 0.5, -0.5, 0.5))]
+    expect(len(m.transforms), len(mounts), "transforms")
+    for i, (t, (frame, position, rotation)) in enumerate(zip(m.transforms, mounts)):
+        check_header(t.header, i, 0, "base_link", frame)
+        expect((t.child_frame_id, xyz(t.transform.translation)), (frame, position), frame)
+        q = t.transform.rotation
+        dot = sum(a * b for a, b in zip((q.x, q.y, q.z, q.w), rotation))
+        if abs(abs(dot) - 1) > 1e-14:
+            sys.exit(f"{frame}: rotation {q}")
+
+
+CHECKS = {"/imu/data": check_imu, "/livox/lidar": check_scan, "/truth": check_truth,
+          "/camera/depth": check_depth, "/camera/camera_info": check_camera_info,
+          "/tf_static": check_tf}
+
+
+def check_types(bag):
+    """The definitions in the bag are those of Debian's message packages."""
+    for c in bag._get_connections():
+        debian = roslib.message.get_message_class(c.datatype)
+        expect(c.md5sum, debian._md5sum, f"{c.datatype} md5")
+        stored = genpy.dynamic.generate_dynamic(c.datatype, c.msg_def)[c.datatype]
+        expect(stored._md5sum, debian._md5sum, f"{c.datatype} md5 of the stored definition")
+        expect(c.header.get("latching"), b"1" if c.topic == "/tf_static" else None,
+               f"{c.topic} latching")
+
+
+def check_messages(bag):
+    seen = dict.fromkeys(TOPICS, 0)
+    last = 0
+    for topic, message, time in bag.read_messages():
+        if time.to_nsec() < last:
+            sys.exit(f"{topic}: read out of order at {time}")
+        last = time.to_nsec()
+        CHECKS[topic](seen[topic], last, message)
+        seen[topic] += 1
+    expect(seen, {topic: count for topic, (_, count) in TOPICS.items()}, "messages read")
+
+
+def check_bag(file, compression):
+    with rosbag.Bag(file) as bag:
+        info = bag.get_type_and_topic_info().topics
+        expect({t: (i.msg_type, i.message_count) for t, i in info.items()}, TOPICS, "topics")
+        expect((bag.version, bag.get_compression_info().compression), (200, compression), "format")
+        expect((bag.get_start_time(), bag.get_end_time()), (1.0, 2.0), "span")
+        check_types(bag)
+        check_messages(bag)
+
+
+def check_killed(file):
+    """What a killed run leaves: rosbag refuses it until reindexed, then has every whole chunk."""
+    try:
+        rosbag.Bag(file)
+        sys.exit("an unfinished bag opens as if it were whole")
+    except rosbag.ROSBagUnindexedException:
+        pass
+    with rosbag.Bag(file, "a", allow_unindexed=True) as bag:
+        for _ in bag.reindex():
+            pass
+    seen = dict.fromkeys(TOPICS, 0)
+    with rosbag.Bag(file) as bag:
+        for topic, message, time in bag.read_messages():
+            CHECKS[topic](seen[topic], time.to_nsec(), message)
+            seen[topic] += 1
+    # Two scans fill a chunk: the ninth, and what followed it, was still in memory.
+    expect((seen["/livox/lidar"], seen["/imu/data"] >= 160, seen["/imu/data"] < 200),
+           (8, True, True), "left by a killed run")
+
+
+def main():
+    write_bag = sys.argv[1]
+    with tempfile.TemporaryDirectory() as folder:
+        def write(compression, end, name):
+            file = os.path.join(folder, name)
+            subprocess.run([write_bag, compression, end, file], check=True)
+            return file
+
+        plain = write("none", "close", "plain.bag")
+        check_bag(plain, "none")
+        check_bag(write("lz4", "close", "lz4.bag"), "lz4")
+        expect(filecmp.cmp(plain, write("none", "close", "again.bag"), shallow=False), True,
+               "the same bytes again")
+        check_killed(write("none", "kill", "killed.bag") + ".active")
+
+
+main()

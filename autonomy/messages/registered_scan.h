@@ -12,10 +12,10 @@ namespace arex {
 
 /// One LiDAR frame, undistorted, in O. The odometry's points are shared, not copied.
 struct RegisteredScan {
-  Stamp stamp = 0;                     ///< end of the frame
-  Vec3 origin_begin_O = Vec3::Zero();  ///< p_OL when the frame began
-  Vec3 origin_end_O = Vec3::Zero();    ///< p_OL at `stamp`
-  Vec3 p_OB = Vec3::Zero();            ///< the vehicle at `stamp`
+  Stamp stamp = 0;                                     ///< end of the frame
+  Vec3 origin_begin_O = Vec3::Zero();                  ///< p_OL when the frame began
+  Vec3 origin_end_O = Vec3::Zero();                    ///< p_OL at `stamp`
+  Vec3 p_OB = Vec3::Zero();                            ///< the vehicle at `stamp`
   std::shared_ptr<const std::vector<Vec3f>> points_O;  ///< in firing order, m
   /// When each point was fired, 0 at the frame's begin, 1 at its end; null: evenly spread.
   std::shared_ptr<const std::vector<float>> fractions;
@@ -23,8 +23,9 @@ struct RegisteredScan {
   [[nodiscard]] std::size_t size() const { return points_O ? points_O->size() : 0; }
   /// The LiDAR's position when point i was fired.
   [[nodiscard]] Vec3 origin_of(std::size_t i) const {
-    const double fraction = fractions ? static_cast<double>((*fractions)[i])
-                                      : (static_cast<double>(i) + 0.5) / static_cast<double>(size());
+    const double fraction = fractions
+                                ? static_cast<double>((*fractions)[i])
+                                : (static_cast<double>(i) + 0.5) / static_cast<double>(size());
     return origin_begin_O + fraction * (origin_end_O - origin_begin_O);
   }
 };

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "mapping/height_band.h"
+#include "mapping/mapping_config.h"
+#include "mapping/occupancy_map_2d.h"
+#include "mapping/ray_caster.h"
+#include "mapping/state_tree.h"
+
+namespace arex {
+
+/// The map of the whole mission inside the exploration bounds, in O: log-odds of every voxel that
+/// was seen, an octree of their states, and the 2D occupancy of the exploration (paper,
+/// Environmental Modelling). OctoMap's sensor model: same states after the same frames.
+///
+/// Log-odds lie in bricks of 8^3 voxels as 16-bit integers in units of 2^-12; only voxels whose
+/// state (unknown, free, occupied) changes go into the octree and the 2D map.
+class GlobalMap {
+ public:
+  GlobalMap(const GlobalMapConfig& config, double resolution_m);
+
+  [[nodiscard]] const CellBox& box() const { return box_; }
+  /// Takes one LiDAR frame. @pre rays were clipped to a box that holds what box() sees of it.
+  void add_frame(const RayCaster& rays);
+
+  /// -1 unknown, 0 free, 1 occupied; unknown outside the bounds.
+  [[nodiscard]] int state(const Cell& cell) const;
+  [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return band_.map(); }
+  /// Height of the ground under a point, m in O; NaN where none was seen nearby (kAbsolute: 0).
+  [[nodiscard]] double ground_at(const Vec2& p) const { return band_.ground_at(p); }
+  [[nodiscard]] const StateTree& tree() const { return tree_; }
+  /// Volume known so far, m^3.
+  [[nodiscard]] double known_volume() const;
+
+  /// OctoMap's binary format. @return whether it could be written.
+  [[nodiscard]] bool write_octomap(const std::filesystem::path& file) const;
+
+ private:
+  struct alignas(32) Brick {
+    std::array<std::int16_t, kBrickVoxels> odds{};
+    BrickMask known{};
+    BrickMask occupied{};
+  };
+  [[nodiscard]] std::size_t slot_of(const Cell& brick) const;
+  /// @return whether a voxel changed its state; `changed` says which.
+  bool update(Brick& brick, const BrickRays& rays, const BrickMask& inside,
+              BrickMask& changed) const;
+
+  double resolution_m_;
+  CellBox box_;
+  Cell brick_low_;
+  Cell brick_count_;
+  std::int16_t hit_units_, miss_units_, min_units_, max_units_;
+  std::vector<std::unique_ptr<Brick>> bricks_;  ///< null: nothing seen
+  StateTree tree_;
+  HeightBand band_;
+  std::vector<BrickChange> changes_;
+};
+
+}  // namespace arex

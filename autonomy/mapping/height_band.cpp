@@ -1,0 +1,159 @@
+#include "mapping/height_band.h"
+
+#include <immintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace arex {
+
+HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const CellBox& box,
+                       const Cell& brick_low, const Cell& brick_count)
+    : reference_(config.band),
+      resolution_m_(resolution_m),
+      band_low_(static_cast<int>(std::lround(config.band_low_m / resolution_m))),
+      band_high_(static_cast<int>(std::lround(config.band_high_m / resolution_m))),
+      min_free_(config.min_free_cells),
+      slope_(config.ground_max_slope * kBrickCells),
+      support_(config.ground_support),
+      box_(box),
+      brick_low_(brick_low),
+      brick_count_(brick_count),
+      tiles_(static_cast<std::size_t>(brick_count.x() * brick_count.y())),
+      column_(static_cast<std::size_t>(brick_count.z())) {
+  const int ground = reference_ == BandReference::kGround ? kNoGround : 0;
+  for (Tile& tile : tiles_) tile.lowest = tile.ground = ground;
+  map_.origin = box.low.head<2>().cast<double>() * resolution_m;
+  map_.resolution = resolution_m;
+  map_.width = box.size().x();
+  map_.height = box.size().y();
+  map_.cells.assign(static_cast<std::size_t>(map_.width) * static_cast<std::size_t>(map_.height),
+                    OccupancyMap2D::kUnknown);
+}
+
+void HeightBand::note(const BrickChange& change) {
+  const Cell at = change.brick - brick_low_;
+  tiles_[static_cast<std::size_t>(at.y() * brick_count_.x() + at.x())].dirty = true;
+}
+
+std::uint64_t HeightBand::layer(const BrickMask& mask, int z) {
+  // Inside a word the bits of one layer are x0 y0 - x1 y1 -; words of a layer are quadrants.
+  const int shift = (z & 1) * 4 + (z >> 1 & 1) * 32;
+  const std::size_t half = z >= 4 ? 4 : 0;
+  std::uint64_t out = 0;
+  for (std::size_t quadrant = 0; quadrant < 4; ++quadrant) {
+    out |= _pext_u64(mask[half + quadrant] >> shift, 0x0f0f0f0fU) << (16 * quadrant);
+  }
+  return out;
+}
+
+void HeightBand::find_ground(Tile& tile) {
+  int found = kNoGround;
+  int below = 0;  // occupied in the layer below
+  for (int k = 0; k < brick_count_.z() && found == kNoGround; ++k) {
+    const BrickMask* const occupied = column_[static_cast<std::size_t>(k)].occupied;
+    if (occupied == nullptr) {
+      below = 0;
+      continue;
+    }
+    for (int z = 0; z < kBrickCells; ++z) {
+      const int here = std::popcount(layer(*occupied, z));
+      if (here + below >= support_) {
+        found = (brick_low_.z() + k) * kBrickCells + z - (below > 0 ? 1 : 0);
+        break;
+      }
+      below = here;
+    }
+  }
+  if (found != tile.lowest) {
+    tile.lowest = found;
+    ground_changed_ = true;
+  }
+}
+
+void HeightBand::spread_ground() {
+  ground_changed_ = false;
+  // Lower envelope of cones, one on each tile's lowest point: two sweeps over the tiles.
+  const int nx = brick_count_.x();
+  const int ny = brick_count_.y();
+  std::vector<double> height(tiles_.size());
+  std::transform(tiles_.begin(), tiles_.end(), height.begin(),
+                 [](const Tile& tile) { return static_cast<double>(tile.lowest); });
+  const auto relax = [&](int x, int y, int dx, int dy) {
+    const int u = x + dx;
+    const int v = y + dy;
+    if (u < 0 || v < 0 || u >= nx || v >= ny) return;
+    const double rise = slope_ * std::hypot(dx, dy);
+    double& here = height[static_cast<std::size_t>(y * nx + x)];
+    here = std::min(here, height[static_cast<std::size_t>(v * nx + u)] + rise);
+  };
+  for (int y = 0; y < ny; ++y) {
+    for (int x = 0; x < nx; ++x) {
+      for (const auto& [dx, dy] : {std::pair{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}) {
+        relax(x, y, dx, dy);
+      }
+    }
+  }
+  for (int y = ny - 1; y >= 0; --y) {
+    for (int x = nx - 1; x >= 0; --x) {
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {1, 1}, {0, 1}, {-1, 1}}) {
+        relax(x, y, dx, dy);
+      }
+    }
+  }
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const int ground = static_cast<int>(std::lround(height[t]));
+    if (ground == tiles_[t].ground) continue;
+    tiles_[t].ground = ground;
+    tiles_[t].dirty = true;
+  }
+}
+
+void HeightBand::evaluate(std::size_t t) {
+  const Tile& tile = tiles_[t];
+  std::uint64_t occupied = 0;
+  std::array<std::uint64_t, 9> free{};  // free[n]: columns with at least n free cells
+  free[0] = ~std::uint64_t{0};
+  if (tile.ground < kNoGround / 2) {
+    const int low = std::max(tile.ground + band_low_, box_.low.z());
+    const int high = std::min(tile.ground + band_high_, box_.high.z());
+    for (int z = low; z < high; ++z) {
+      const int in = z - brick_low_.z() * kBrickCells;
+      const States& states = column_[static_cast<std::size_t>(in / kBrickCells)];
+      if (states.known == nullptr) continue;
+      const std::uint64_t full = layer(*states.occupied, in % kBrickCells);
+      const std::uint64_t empty = layer(*states.known, in % kBrickCells) & ~full;
+      occupied |= full;
+      for (int n = min_free_; n > 0; --n) {
+        free[static_cast<std::size_t>(n)] |= free[static_cast<std::size_t>(n - 1)] & empty;
+      }
+    }
+  }
+  const std::uint64_t enough = free[static_cast<std::size_t>(min_free_)];
+  const int x0 = (brick_low_.x() + static_cast<int>(t) % brick_count_.x()) * kBrickCells;
+  const int y0 = (brick_low_.y() + static_cast<int>(t) / brick_count_.x()) * kBrickCells;
+  for (unsigned i = 0; i < 64; ++i) {
+    const int x = x0 + static_cast<int>(_pext_u32(i, 0x15));
+    const int y = y0 + static_cast<int>(_pext_u32(i, 0x2a));
+    const Eigen::Vector2i cell(x - box_.low.x(), y - box_.low.y());
+    if (!map_.contains(cell)) continue;
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    map_.cells[map_.index(cell)] = (occupied & bit) != 0 ? OccupancyMap2D::kOccupied
+                                   : (enough & bit) != 0 ? OccupancyMap2D::kFree
+                                                         : OccupancyMap2D::kUnknown;
+  }
+}
+
+double HeightBand::ground_at(const Vec2& p) const {
+  const int x = (static_cast<int>(std::floor(p.x() / resolution_m_)) >> 3) - brick_low_.x();
+  const int y = (static_cast<int>(std::floor(p.y() / resolution_m_)) >> 3) - brick_low_.y();
+  if (x < 0 || y < 0 || x >= brick_count_.x() || y >= brick_count_.y()) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const int ground = tiles_[static_cast<std::size_t>(y * brick_count_.x() + x)].ground;
+  return ground < kNoGround / 2 ? ground * resolution_m_ : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace arex

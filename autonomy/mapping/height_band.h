@@ -1,0 +1,93 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "mapping/mapping_config.h"
+#include "mapping/occupancy_map_2d.h"
+#include "mapping/state_tree.h"
+
+namespace arex {
+
+/// The 2D occupancy of the exploration from a height band of the voxel map (paper, Environmental
+/// Modelling: points 0-2 m above ground).
+///
+/// A column is occupied when a voxel of it in the band is, free when at least `min_free_cells` of
+/// the band are known free, else unknown. With BandReference::kGround the band stands on the
+/// ground, estimated from the map itself per tile of 8 x 8 columns: the lowest two layers with
+/// `ground_support` occupied voxels, limited by what the neighbours allow at `ground_max_slope`, so
+/// that a tile in which only a trunk was seen takes its neighbours' ground. No tile, no ground: the
+/// tile stays unknown. Works on 64 columns at a time.
+class HeightBand {
+ public:
+  /// The states of a brick; null pointers: nothing known.
+  struct States {
+    const BrickMask* known = nullptr;
+    const BrickMask* occupied = nullptr;
+  };
+
+  HeightBand(const GlobalMapConfig& config, double resolution_m, const CellBox& box,
+             const Cell& brick_low, const Cell& brick_count);
+
+  [[nodiscard]] const OccupancyMap2D& map() const { return map_; }
+  /// The ground under a point, m in O; not finite where none was seen nearby.
+  [[nodiscard]] double ground_at(const Vec2& p) const;
+
+  /// Marks the tile of a brick that changed.
+  void note(const BrickChange& change);
+
+  /// Brings the map up to date. `states_of(brick)` gives a brick's States.
+  template <class StatesOf>
+  void refresh(const StatesOf& states_of) {
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      if (tiles_[t].dirty) load(t, states_of);
+    }
+    if (ground_changed_) spread_ground();
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      if (!tiles_[t].dirty) continue;
+      load(t, states_of);
+      evaluate(t);
+      tiles_[t].dirty = false;
+    }
+  }
+
+ private:
+  struct Tile {
+    bool dirty = false;
+    int lowest = 0;  ///< cell of the ground as seen in this tile
+    int ground = 0;  ///< as the neighbours allow
+  };
+  static constexpr int kNoGround = 1 << 20;
+
+  template <class StatesOf>
+  void load(std::size_t tile, const StatesOf& states_of) {
+    Cell brick = brick_low_;
+    brick.x() += static_cast<int>(tile) % brick_count_.x();
+    brick.y() += static_cast<int>(tile) / brick_count_.x();
+    for (int k = 0; k < brick_count_.z(); ++k, ++brick.z()) {
+      column_[static_cast<std::size_t>(k)] = states_of(brick);
+    }
+    if (reference_ == BandReference::kGround) find_ground(tiles_[tile]);
+  }
+  void find_ground(Tile& tile);
+  void spread_ground();
+  void evaluate(std::size_t tile);
+  /// The 8 x 8 voxels of a layer of the loaded column, bit = 2D Morton order.
+  [[nodiscard]] static std::uint64_t layer(const BrickMask& mask, int z);
+
+  BandReference reference_;
+  double resolution_m_;
+  int band_low_, band_high_;  ///< cells, above the ground or in O
+  int min_free_;
+  double slope_;
+  int support_;
+  CellBox box_;
+  Cell brick_low_, brick_count_;
+  std::vector<Tile> tiles_;
+  std::vector<States> column_;  ///< bricks of the tile at hand
+  bool ground_changed_ = false;
+  OccupancyMap2D map_;
+};
+
+}  // namespace arex

@@ -53,8 +53,7 @@ void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec
   const Mat3 regular = other + kLeastInformation * Mat3::Identity();
   const Mat3 schur = own - cross * regular.inverse() * cross.transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (schur + schur.transpose()));
-  deviations =
-      solver.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse().cwiseSqrt().reverse();
+  deviations = solver.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse().cwiseSqrt();
   worst_axis = solver.eigenvectors().col(0);
 }
 

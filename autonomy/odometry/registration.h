@@ -16,7 +16,7 @@ struct RegistrationReport {
   int iterations = 0;
   double residual_rms_sigma = 0;  ///< of the matched, in sigma
   bool accepted = false;          ///< the filter was corrected
-  /// Standard deviation that this scan alone leaves in its worst and other directions, ascending.
+  /// Standard deviation that this scan alone leaves, the worst direction first.
   Vec3 position_std_m = Vec3::Zero();
   Vec3 rotation_std_rad = Vec3::Zero();
   Vec3 worst_position_axis_O = Vec3::UnitZ();

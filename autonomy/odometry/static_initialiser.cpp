@@ -30,8 +30,7 @@ Moments moments(std::span<const ImuSample> samples) {
   return m;
 }
 
-ErrorMatrix prior_covariance(const LidarInertialConfig& config) {
-  const StaticInitialiserConfig& sc = config.initialiser;
+ErrorMatrix prior_covariance(const StaticInitialiserConfig& sc) {
   // The start defines O; this only keeps the filter's algebra regular.
   constexpr double kDefinedStd = 1e-5;
   // Gravity before it is measured.
@@ -46,11 +45,25 @@ ErrorMatrix prior_covariance(const LidarInertialConfig& config) {
   set(kGyroBias, sc.gyro_bias_std_radps);
   set(kAccelBias, sc.accel_bias_std_mps2);
   set(kGravityBlock, kGravityPriorStd);
-  if (config.estimate_extrinsics) {
-    set(kExtrinsicRotation, config.extrinsic_rotation_std_rad);
-    set(kExtrinsicPosition, config.extrinsic_position_std_m);
-  }
   return P;
+}
+
+/// Adds doubt about the mounting. The map is made by the LiDAR, so O is where the map is: what the
+/// start fixes is the LiDAR's pose in O, and gravity in B. An error of the mounting is at first one
+/// of B's pose and of gravity in O as well, and only motion tells them apart.
+void doubt_mounting(const LidarInertialConfig& config, const NavigationState& x, ErrorMatrix& P) {
+  Eigen::Matrix<double, kErrorDim, 6> T = Eigen::Matrix<double, kErrorDim, 6>::Zero();
+  T.block<3, 3>(kExtrinsicRotation, 0) = Mat3::Identity();
+  T.block<3, 3>(kExtrinsicPosition, 3) = Mat3::Identity();
+  const Mat3 turn = -x.X_BL.R;  // of B, that keeps R_OL
+  T.block<3, 3>(kRotation, 0) = turn;
+  T.block<3, 3>(kPosition, 0) = x.R_OB * so3::hat(x.X_BL.p) * turn;  // keeps p_OL
+  T.block<3, 3>(kPosition, 3) = -x.R_OB;
+  T.block<3, 3>(kGravityBlock, 0) = -x.R_OB * so3::hat(x.R_OB.transpose() * x.g_O) * turn;
+  Eigen::Matrix<double, 6, 1> variance;
+  variance.head<3>().setConstant(std::pow(config.extrinsic_rotation_std_rad, 2));
+  variance.tail<3>().setConstant(std::pow(config.extrinsic_position_std_m, 2));
+  P += T * variance.asDiagonal() * T.transpose();
 }
 
 /// Roll and pitch that turn the specific force f_B to z; yaw zero.
@@ -87,7 +100,7 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
   x.b_g = m.gyro_mean;
   x.X_BL = X_BL;
   ErrorStateFilter filter(config.imu);
-  filter.reset(x, prior_covariance(config));
+  filter.reset(x, prior_covariance(sc));
 
   // At rest f_B = -R^T g + b_a.
   Eigen::Matrix<double, 3, kErrorDim> H = Eigen::Matrix<double, 3, kErrorDim>::Zero();
@@ -104,6 +117,7 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
                     Eigen::Matrix<double, 1, 1>(std::pow(sc.gravity_std_mps2, 2)));
   start.state = filter.state();
   start.covariance = filter.covariance();
+  if (config.estimate_extrinsics) doubt_mounting(config, start.state, start.covariance);
   return start;
 }
 

@@ -1,0 +1,341 @@
+#include "odometry/lidar_inertial_odometry.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "math/so3.h"
+#include "support/analytic_world.h"
+
+namespace arex {
+namespace {
+
+constexpr Stamp kFrame = 100'000'000;
+constexpr Stamp kPeriod = 5'000'000;
+constexpr double kRadius = 0.3;
+
+Pose mounting() { return VehicleConfig{}.X_BL(); }
+
+/// A recorded flight: simulated once, flown by several tests.
+struct Recording {
+  test::AnalyticWorld world;
+  test::AnalyticMotion motion;
+  std::vector<ImuSample> imu;
+  std::vector<LidarScanPtr> scans;
+};
+
+Recording record(const test::AnalyticWorld& world, const test::AnalyticMotion& motion,
+                 double duration_s, const test::SensorNoise& noise, std::uint64_t seed, int stride,
+                 const Pose& X_BL = mounting()) {
+  Recording r{world, motion, {}, {}};
+  const Stamp end = from_seconds(duration_s);
+  r.imu = test::simulate_imu(motion, end, noise, seed);
+  for (Stamp t = 0; t + kFrame <= end; t += kFrame) {
+    r.scans.push_back(std::make_shared<LidarScan>(
+        test::simulate_scan(world, motion, X_BL, t, noise, seed, stride)));
+  }
+  return r;
+}
+
+const Recording& forest() {
+  static const Recording r =
+      record(test::AnalyticWorld::forest(3, 24, 16),
+             {test::loop_points(24, 16, 1.5, 1.5, 0.8, 1), 0.8, 1.5}, 16, {}, 3, 4);
+  return r;
+}
+
+const Recording& standing() {
+  static const Recording r =
+      record(test::AnalyticWorld::hall(), {{Vec4::Zero()}, 1, 100}, 61, {}, 5, 16);
+  return r;
+}
+
+/// What the outside sees at each IMU sample, and each scan's update.
+struct Flown {
+  std::vector<Odometry> fast;
+  std::vector<ScanUpdate> updates;
+  double largest_step_m = 0, largest_step_rad = 0;
+};
+
+using Tamper = std::function<LidarScanPtr(const LidarScanPtr&)>;
+
+Flown fly(const Recording& r, const LidarInertialConfig& config, Stamp latency = 20'000'000,
+          const Tamper& tamper = {}) {
+  LidarInertialOdometry odometry(config, mounting(), kRadius);
+  Flown run;
+  std::size_t next = 0;
+  std::optional<ScanUpdate> pending;
+  for (const ImuSample& sample : r.imu) {
+    const Odometry now = odometry.add_imu(sample);
+    if (next < r.scans.size() && sample.stamp == r.scans[next]->end) {
+      LidarScanPtr scan = r.scans[next++];
+      if (tamper) scan = tamper(scan);
+      if (scan) pending = odometry.correct(odometry.prepare(scan));
+    }
+    if (pending && sample.stamp >= pending->stamp + latency) {
+      odometry.apply(*pending);
+      if (now.status != OdometryStatus::kInitialising) {
+        const Pose& after = odometry.odometry().X_OB;
+        run.largest_step_m = std::max(run.largest_step_m, (after.p - now.X_OB.p).norm());
+        run.largest_step_rad =
+            std::max(run.largest_step_rad, so3::angle(now.X_OB.R.transpose() * after.R));
+      }
+      run.updates.push_back(std::move(*pending));
+      pending.reset();
+    }
+    run.fast.push_back(odometry.odometry());
+  }
+  return run;
+}
+
+double position_error(const Recording& r, Stamp stamp, const Vec3& p_OB) {
+  return (p_OB - r.motion.at(to_seconds(stamp)).X_OB.p).norm();
+}
+
+double worst_error(const Recording& r, const Flown& run) {
+  double worst = 0;
+  for (const ScanUpdate& u : run.updates) {
+    if (u.status == OdometryStatus::kInitialising) continue;
+    worst = std::max(worst, position_error(r, u.stamp, u.state.p_OB));
+  }
+  return worst;
+}
+
+int count(const Flown& run, OdometryStatus status) {
+  int n = 0;
+  for (const Odometry& o : run.fast) n += o.status == status;
+  return n;
+}
+
+TEST(StaticInitialiser, FindsDownAndTheGyroBias) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    // Standing tilted: a motion's attitude is level, so the samples are turned.
+    const Mat3 R_tilt = so3::Exp({0.05, -0.08, 0});
+    test::SensorNoise noise;
+    auto samples = test::simulate_imu({{Vec4::Zero()}, 1, 100}, from_seconds(2), noise, seed);
+    for (ImuSample& s : samples) {
+      s.accel_mps2 = R_tilt.transpose() * (s.accel_mps2 - noise.accel_bias) + noise.accel_bias;
+    }
+    const LidarInertialConfig config;
+    const auto start = start_from_standstill(samples, mounting(), config);
+    ASSERT_TRUE(start);
+    const Mat3 down_error = start->state.R_OB * R_tilt.transpose();
+    // The horizontal bias of 0.05 m/s^2 is what standing still cannot tell from a tilt.
+    EXPECT_LT(so3::angle(so3::from_yaw(-so3::yaw(down_error)) * down_error), 1.2 * 0.05 / kGravity);
+    EXPECT_LT((start->state.b_g - noise.gyro_bias).norm(), 5e-4);
+    EXPECT_NEAR(start->state.g_O.norm(), kGravity, 1e-6);
+    // So gravity in O and the bias are both in doubt, but not their sum in the measurement.
+    const ErrorMatrix& P = start->covariance;
+    EXPECT_NEAR(std::sqrt(P(kGravityBlock, kGravityBlock)), config.initialiser.accel_bias_std_mps2,
+                0.005);
+    Eigen::Matrix<double, 3, kErrorDim> H = Eigen::Matrix<double, 3, kErrorDim>::Zero();
+    H.block<3, 3>(0, kGravityBlock) = -start->state.R_OB.transpose();
+    H.block<3, 3>(0, kAccelBias) = Mat3::Identity();
+    EXPECT_LT(std::sqrt((H * P * H.transpose()).diagonal().maxCoeff()), 0.005);
+  }
+}
+
+TEST(StaticInitialiser, WaitsWhileItIsShakenOrTurned) {
+  const LidarInertialConfig config;
+  auto samples = test::simulate_imu({{Vec4::Zero()}, 1, 100}, from_seconds(2), {}, 1);
+  ASSERT_TRUE(start_from_standstill(samples, mounting(), config));
+  EXPECT_FALSE(start_from_standstill({samples.begin(), 100}, mounting(), config));  // too short
+  auto shaken = samples;
+  for (std::size_t i = 0; i < shaken.size(); ++i) {
+    shaken[i].accel_mps2.x() += i % 2 == 0 ? 1 : -1;
+  }
+  EXPECT_FALSE(start_from_standstill(shaken, mounting(), config));
+  auto turned = samples;
+  for (ImuSample& s : turned) s.gyro_radps.z() += 0.3;
+  EXPECT_FALSE(start_from_standstill(turned, mounting(), config));
+  EXPECT_FALSE(start_from_standstill({}, mounting(), config));
+}
+
+TEST(LidarInertialOdometry, FollowsAFlightThroughAForest) {
+  const Flown run = fly(forest(), {});
+  EXPECT_LT(worst_error(forest(), run), 0.03);
+  EXPECT_EQ(count(run, OdometryStatus::kDegenerate), 0);
+  EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
+  EXPECT_LT(run.largest_step_m, 0.03);
+  EXPECT_LT(run.largest_step_rad, 0.3 * 3.14159 / 180);
+  const ScanUpdate& last = run.updates.back();
+  const test::MotionState truth = forest().motion.at(to_seconds(last.stamp));
+  EXPECT_LT((last.state.v_OB - truth.v_OB).norm(), 0.05);
+  EXPECT_LT(std::abs(so3::wrap(so3::yaw(last.state.R_OB) - so3::yaw(truth.X_OB.R))), 0.004);
+  EXPECT_LT((last.state.b_g - Vec3(0.004, -0.003, 0.002)).norm(), 1e-3);
+}
+
+TEST(LidarInertialOdometry, TheFastOutputIsAsGoodAsTheScans) {
+  const Flown run = fly(forest(), {});
+  double worst = 0;
+  for (const Odometry& o : run.fast) {
+    if (o.status != OdometryStatus::kOk) continue;
+    worst = std::max(worst, position_error(forest(), o.stamp, o.X_OB.p));
+    EXPECT_LE(o.stamp - o.correction_stamp, kFrame + 20'000'000);
+  }
+  EXPECT_LT(worst, worst_error(forest(), run) + 0.01);
+}
+
+TEST(LidarInertialOdometry, PointsLieOnTheSurfaces) {
+  const Flown run = fly(forest(), {});
+  std::vector<double> errors;
+  for (const ScanUpdate& u : run.updates) {
+    for (std::size_t i = 0; i < u.points_O->size(); i += 37) {
+      errors.push_back(forest().world.distance((*u.points_O)[i].cast<double>()));
+    }
+  }
+  ASSERT_GT(errors.size(), 1000U);
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.015);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.06);
+}
+
+TEST(LidarInertialOdometry, HoldsStillOnAStaticVehicle) {
+  const Flown run = fly(standing(), {});
+  EXPECT_LT(worst_error(standing(), run), 0.01);
+  EXPECT_GT(count(run, OdometryStatus::kOk), 59 * 200);
+}
+
+TEST(LidarInertialOdometry, LatencyChangesWhenNotWhat) {
+  const Flown now = fly(forest(), {}, 0), late = fly(forest(), {}, 60'000'000);
+  ASSERT_EQ(now.updates.size(), late.updates.size() + 1);  // the last comes after the end
+  for (std::size_t i = 0; i < late.updates.size(); ++i) {
+    EXPECT_EQ(now.updates[i].state.p_OB, late.updates[i].state.p_OB);
+    EXPECT_EQ(now.updates[i].state.R_OB, late.updates[i].state.R_OB);
+  }
+  // Once the late update is in, both outputs have integrated the same samples from the same anchor.
+  int compared = 0;
+  for (std::size_t i = 0; i < now.fast.size(); ++i) {
+    if (now.fast[i].status == OdometryStatus::kInitialising ||
+        now.fast[i].correction_stamp != late.fast[i].correction_stamp) {
+      continue;
+    }
+    ++compared;
+    EXPECT_LT((now.fast[i].X_OB.p - late.fast[i].X_OB.p).norm(), 1e-12);
+    EXPECT_LT((now.fast[i].v_OB - late.fast[i].v_OB).norm(), 1e-12);
+  }
+  EXPECT_GT(compared, 500);
+}
+
+TEST(LidarInertialOdometry, TwoRunsAreBitIdentical) {
+  const Flown a = fly(forest(), {}), b = fly(forest(), {});
+  ASSERT_EQ(a.updates.size(), b.updates.size());
+  for (std::size_t i = 0; i < a.updates.size(); ++i) {
+    EXPECT_EQ(a.updates[i].state.p_OB, b.updates[i].state.p_OB);
+    EXPECT_EQ(a.updates[i].covariance, b.updates[i].covariance);
+    EXPECT_TRUE(*a.updates[i].points_O == *b.updates[i].points_O);
+  }
+}
+
+TEST(LidarInertialOdometry, SurvivesASecondWithoutScans) {
+  const Tamper silence = [](const LidarScanPtr& scan) {
+    return scan->stamp >= from_seconds(9) && scan->stamp < from_seconds(10) ? nullptr : scan;
+  };
+  const Flown run = fly(forest(), {}, 20'000'000, silence);
+  EXPECT_LT(worst_error(forest(), run), 0.06);
+  EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
+  EXPECT_GT(count(run, OdometryStatus::kDegenerate), 100);  // and says so meanwhile
+  EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
+}
+
+TEST(LidarInertialOdometry, SurvivesEmptyScans) {
+  const Tamper empty = [](const LidarScanPtr& scan) -> LidarScanPtr {
+    if (scan->stamp < from_seconds(9) || scan->stamp >= from_seconds(9.3)) return scan;
+    auto none = std::make_shared<LidarScan>(*scan);
+    none->points.clear();
+    return none;
+  };
+  const Flown run = fly(forest(), {}, 20'000'000, empty);
+  EXPECT_LT(worst_error(forest(), run), 0.04);
+  EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
+}
+
+TEST(LidarInertialOdometry, SurvivesTheLossOfEveryFifthPoint) {
+  const Tamper thinned = [](const LidarScanPtr& scan) {
+    auto rest = std::make_shared<LidarScan>(*scan);
+    RandomStream random(static_cast<std::uint64_t>(scan->stamp), "loss");
+    std::erase_if(rest->points, [&](const LidarPoint&) { return random.uniform() < 0.2; });
+    return rest;
+  };
+  EXPECT_LT(worst_error(forest(), fly(forest(), {}, 20'000'000, thinned)), 0.03);
+}
+
+TEST(LidarInertialOdometry, SurvivesABurstOfFalseReturns) {
+  for (const double share : {0.1, 0.5}) {
+    const Tamper burst = [share](const LidarScanPtr& scan) -> LidarScanPtr {
+      if (scan->stamp < from_seconds(8) || scan->stamp >= from_seconds(8.5)) return scan;
+      auto wrong = std::make_shared<LidarScan>(*scan);
+      RandomStream random(static_cast<std::uint64_t>(scan->stamp), "burst");
+      for (LidarPoint& point : wrong->points) {
+        if (random.uniform() < share) {
+          point.p_L *= static_cast<float>(random.uniform(0.5, 20)) / point.p_L.norm();
+        }
+      }
+      return wrong;
+    };
+    const Flown run = fly(forest(), {}, 20'000'000, burst);
+    EXPECT_LT(worst_error(forest(), run), 0.04) << share;
+    EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
+    EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
+  }
+}
+
+TEST(LidarInertialOdometry, RecoversOnItsMapAfterALoss) {
+  // The scans of 1.5 s show another place: lost; then the world is back, the vehicle moved on.
+  const Tamper elsewhere = [](const LidarScanPtr& scan) -> LidarScanPtr {
+    if (scan->stamp < from_seconds(8) || scan->stamp >= from_seconds(9.5)) return scan;
+    auto wrong = std::make_shared<LidarScan>(*scan);
+    RandomStream random(static_cast<std::uint64_t>(scan->stamp), "elsewhere");
+    for (LidarPoint& point : wrong->points) {
+      point.p_L = (random.uniform(1, 25) * random.normal3().normalized()).cast<float>();
+    }
+    return wrong;
+  };
+  const Flown run = fly(forest(), {}, 20'000'000, elsewhere);
+  EXPECT_GT(count(run, OdometryStatus::kLost), 50);
+  EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
+  const ScanUpdate& last = run.updates.back();
+  EXPECT_LT(position_error(forest(), last.stamp, last.state.p_OB), 0.05);
+  EXPECT_TRUE(std::any_of(run.updates.begin(), run.updates.end(),
+                          [](const ScanUpdate& u) { return u.recovered; }));
+}
+
+TEST(LidarInertialOdometry, SaysThatAPlainTellsTooLittle) {
+  const Recording plain =
+      record(test::AnalyticWorld::plain(), {test::loop_points(24, 16, 1.5, 1.5, 0.8, 1), 0.8, 1.5},
+             6, {}, 1, 8);
+  const Flown run = fly(plain, {});
+  EXPECT_NE(run.fast.back().status, OdometryStatus::kOk);
+  const auto weak = std::find_if(run.updates.begin(), run.updates.end(), [](const ScanUpdate& u) {
+    return u.status == OdometryStatus::kDegenerate;
+  });
+  ASSERT_NE(weak, run.updates.end());
+  EXPECT_GT(weak->registration.position_std_m[0], OdometryHealthConfig{}.degenerate_position_std_m);
+  EXPECT_LT(std::abs(weak->registration.worst_position_axis_O.z()), 0.1);
+}
+
+TEST(LidarInertialOdometry, FindsAMountingThatIsOffByADegree) {
+  const Vec3 offset = Vec3(0.6, -0.6, 0.53).normalized() * 0.01745;
+  Pose X_BL = mounting();
+  X_BL.R = X_BL.R * so3::Exp(offset);
+  const Recording r = record(forest().world, forest().motion, 16, {}, 4, 8, X_BL);
+  LidarInertialConfig config;
+  config.estimate_extrinsics = true;
+  const Flown run = fly(r, config);
+  const Mat3 error = run.updates.back().state.X_BL.R.transpose() * X_BL.R;
+  EXPECT_LT(so3::angle(error), 0.2 * 3.14159 / 180);
+}
+
+TEST(LidarInertialOdometry, BeforeTheStartItSaysSo) {
+  LidarInertialOdometry odometry({}, mounting(), kRadius);
+  const Odometry first = odometry.add_imu({kPeriod, Vec3::Zero(), Vec3(0, 0, kGravity)});
+  EXPECT_EQ(first.status, OdometryStatus::kInitialising);
+  EXPECT_EQ(first.stamp, kPeriod);
+  EXPECT_EQ(first.X_OB.p, Vec3::Zero().eval());
+  auto scan = std::make_shared<LidarScan>();
+  scan->end = kFrame;
+  EXPECT_EQ(odometry.add_scan(scan).status, OdometryStatus::kInitialising);
+}
+
+}  // namespace
+}  // namespace arex

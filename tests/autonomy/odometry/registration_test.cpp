@@ -1,0 +1,187 @@
+#include "odometry/registration.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <tuple>
+
+#include "math/random.h"
+#include "math/so3.h"
+
+namespace arex {
+namespace {
+
+TEST(PlaneResidual, JacobianIsTheDerivativeInEveryBlock) {
+  constexpr double h = 1e-6;
+  constexpr std::array<int, 4> kBlocks{kRotation, kPosition, kExtrinsicRotation,
+                                       kExtrinsicPosition};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    RandomStream random(seed, "residual");
+    NavigationState x;
+    x.R_OB = so3::Exp(random.normal3());
+    x.p_OB = random.normal3();
+    x.X_BL = {so3::Exp(random.normal3()), random.normal3()};
+    ScanPoint point;
+    point.p_L = (5 * random.normal3()).cast<float>();
+    point.range_m = point.p_L.norm();
+    SurfelMatch match;
+    match.normal = random.normal3().normalized();
+    match.mean = random.normal3();
+    const LidarNoiseConfig noise;
+    const PlaneResidual residual = plane_residual(x, point, match, noise);
+    for (int b = 0; b < 4; ++b) {
+      for (int i = 0; i < 3; ++i) {
+        const ErrorVector e = h * ErrorVector::Unit(kBlocks[static_cast<std::size_t>(b)] + i);
+        const double numeric = (plane_residual(retract(x, e), point, match, noise).r -
+                                plane_residual(retract(x, -e), point, match, noise).r) /
+                               (2 * h);
+        EXPECT_NEAR(residual.h[3 * b + i], numeric, 1e-7) << "block " << b;
+      }
+    }
+  }
+}
+
+TEST(PlaneResidual, VarianceIsThatOfANoisyBeam) {
+  RandomStream random(2, "beam");
+  const LidarNoiseConfig noise;
+  NavigationState x;
+  SurfelMatch match;
+  match.normal = Vec3(0.3, 0.2, 1).normalized();
+  const Vec3 beam = Vec3(1, 0.2, -0.4).normalized();
+  constexpr double kRange = 12;
+  ScanPoint point;
+  point.range_m = kRange;
+  double sum = 0;
+  constexpr int kSamples = 20000;
+  for (int i = 0; i < kSamples; ++i) {
+    const Vec3 across = noise.angle_std_rad * kRange * random.normal3();
+    const Vec3 p = beam * (kRange + std::sqrt(noise.range_variance(kRange)) * random.normal()) +
+                   across - beam * beam.dot(across);
+    const double r = match.normal.dot(p - kRange * beam);
+    sum += r * r;
+  }
+  point.p_L = (kRange * beam).cast<float>();
+  const double told = plane_residual(x, point, match, noise).variance_m2;
+  EXPECT_NEAR(sum / kSamples / told, 1, 0.04);  // 4 sigma of the estimate
+}
+
+TEST(Thin, KeepsTheFirstPointOfEveryCell) {
+  RandomStream random(1, "thin");
+  std::vector<ScanPoint> points;
+  for (std::uint32_t i = 0; i < 5000; ++i) {
+    ScanPoint point;
+    point.p_L = (3 * random.normal3()).cast<float>();
+    point.index = i;
+    points.push_back(point);
+  }
+  std::set<std::tuple<int, int, int>> cells;
+  std::vector<std::uint32_t> expected;
+  for (const ScanPoint& point : points) {
+    const auto c = (point.p_L / 0.5F).array().floor().cast<int>().eval();
+    if (cells.insert({c.x(), c.y(), c.z()}).second) expected.push_back(point.index);
+  }
+  const auto kept = thin(points, 0.5, 100000);
+  ASSERT_EQ(kept.size(), expected.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) EXPECT_EQ(kept[i].index, expected[i]);
+  EXPECT_EQ(thin(points, 0.5, 500).size(), 500U);
+  EXPECT_TRUE(thin({}, 0.5, 500).empty());
+}
+
+/// A corner of three walls (or a single one), a vehicle 2 m off each.
+struct Corner {
+  explicit Corner(bool all_walls) : map(SurfelMapConfig{}) {
+    RandomStream random(1, "corner");
+    std::vector<Vec3f> cloud;
+    for (int i = 0; i < 60000; ++i) {
+      const int wall = all_walls ? i % 3 : 2;
+      Vec3 p(random.uniform(-6, 6), random.uniform(-6, 6), random.uniform(-6, 6));
+      p[wall] = -2.1 + 0.005 * random.normal();
+      cloud.emplace_back(p.cast<float>());
+      if (i % 20 == 0) {
+        ScanPoint point;
+        point.p_L = p.cast<float>();
+        point.range_m = static_cast<float>(p.norm());
+        points.push_back(point);
+      }
+    }
+    map.insert(cloud, std::vector<float>(cloud.size(), 1e-4F));
+  }
+  SurfelMap map;
+  std::vector<ScanPoint> points;
+};
+
+ErrorMatrix pose_doubt() {
+  ErrorMatrix P = 1e-6 * ErrorMatrix::Identity();
+  P.diagonal().head<3>().setConstant(1e-3);
+  P.diagonal().segment<3>(kPosition).setConstant(1e-2);
+  P.bottomRightCorner<6, 6>().setZero();
+  return P;
+}
+
+TEST(RegisterScan, FindsThePoseInACorner) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    RandomStream random(seed, "prior");
+    NavigationState x;
+    x.R_OB = so3::Exp(0.02 * random.normal3());
+    x.p_OB = 0.06 * random.normal3();
+    ErrorStateFilter filter(config.imu);
+    filter.reset(x, pose_doubt());
+    const RegistrationReport report = register_scan(corner.points, corner.map, config, filter);
+    EXPECT_TRUE(report.accepted);
+    EXPECT_LT(filter.state().p_OB.norm(), 0.003);
+    EXPECT_LT(so3::angle(filter.state().R_OB), 0.001);
+    EXPECT_LT(report.position_std_m[0], 0.005);
+  }
+}
+
+TEST(RegisterScan, NamesTheDirectionsThatOneWallLeavesOpen) {
+  const Corner wall(false);
+  const LidarInertialConfig config;
+  ErrorStateFilter filter(config.imu);
+  filter.reset(NavigationState{}, pose_doubt());
+  const RegistrationReport report = register_scan(wall.points, wall.map, config, filter);
+  EXPECT_GT(report.position_std_m[1], 50 * report.position_std_m[2]);  // two of three are open
+  EXPECT_LT(std::abs(report.worst_position_axis_O.z()), 0.05);
+  EXPECT_GT(std::abs(report.worst_rotation_axis_B.z()), 0.95);
+  // And the filter knows; the scatter of the fitted normals feigns a little.
+  EXPECT_GT(filter.covariance()(kPosition, kPosition), 0.5e-2);
+  EXPECT_LT(filter.covariance()(kPosition + 2, kPosition + 2), 1e-5);
+}
+
+// A third of the points floats in the room, all on one side of every wall, under a prior that
+// doubts 10 cm: the gate is wide open, the weights must do it.
+TEST(RegisterScan, OutliersHardlyMoveIt) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  RandomStream random(4, "outliers");
+  std::vector<ScanPoint> points = corner.points;
+  for (std::size_t i = 0; i < points.size(); i += 3) {
+    points[i].p_L = (random.uniform(0.5, 4) * random.normal3().normalized()).cast<float>();
+    points[i].range_m = points[i].p_L.norm();
+  }
+  ErrorStateFilter filter(config.imu);
+  filter.reset(NavigationState{}, pose_doubt());
+  const RegistrationReport report = register_scan(points, corner.map, config, filter);
+  EXPECT_TRUE(report.accepted);
+  EXPECT_LT(filter.state().p_OB.norm(), 0.02);
+}
+
+TEST(RegisterScan, RefusesWhatDoesNotFit) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  ErrorStateFilter filter(config.imu);
+  NavigationState x;
+  x.p_OB = Vec3(30, 30, 30);
+  filter.reset(x, pose_doubt());
+  const ErrorMatrix before = filter.covariance();
+  const RegistrationReport report = register_scan(corner.points, corner.map, config, filter);
+  EXPECT_FALSE(report.accepted);
+  EXPECT_EQ(filter.state().p_OB, x.p_OB);
+  EXPECT_EQ(filter.covariance(), before);
+  EXPECT_FALSE(register_scan({}, corner.map, config, filter).accepted);
+}
+
+}  // namespace
+}  // namespace arex

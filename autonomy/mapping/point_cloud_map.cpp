@@ -1,0 +1,82 @@
+#include "mapping/point_cloud_map.h"
+
+#include <cmath>
+
+namespace arex {
+namespace {
+
+constexpr std::size_t kFirstSlots = 1U << 16;
+// A voxel's mean settles; more points would only wear out its count.
+constexpr std::uint32_t kMaxCount = 1000;
+
+std::uint64_t key_of(const Vec3f& p, double voxel_m) {
+  constexpr int kBits = 21;
+  std::uint64_t key = 0;
+  for (int i = 0; i < 3; ++i) {
+    const auto c = static_cast<std::int64_t>(std::floor(static_cast<double>(p[i]) / voxel_m)) +
+                   (std::int64_t{1} << (kBits - 1));
+    key = (key << kBits) | (static_cast<std::uint64_t>(c) & ((std::uint64_t{1} << kBits) - 1));
+  }
+  return key;
+}
+
+std::size_t hash_of(std::uint64_t key) {  // SplitMix64's finaliser
+  key ^= key >> 30;
+  key *= 0xbf58476d1ce4e5b9ULL;
+  key ^= key >> 27;
+  key *= 0x94d049bb133111ebULL;
+  return static_cast<std::size_t>(key ^ (key >> 31));
+}
+
+}  // namespace
+
+PointCloudMap::PointCloudMap(const PointCloudMapConfig& config)
+    : config_(config), slots_(kFirstSlots, 0) {}
+
+std::size_t PointCloudMap::slot_of(std::uint64_t key) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t i = hash_of(key) & mask;
+  while (slots_[i] != 0 && voxels_[slots_[i] - 1].key != key) i = (i + 1) & mask;
+  return i;
+}
+
+void PointCloudMap::grow() {
+  slots_.assign(2 * slots_.size(), 0);
+  for (std::size_t i = 0; i < voxels_.size(); ++i) {
+    slots_[slot_of(voxels_[i].key)] = static_cast<std::uint32_t>(i + 1);
+  }
+}
+
+void PointCloudMap::insert(std::span<const Vec3f> points_O) {
+  for (const Vec3f& p : points_O) {
+    if (!p.allFinite()) continue;
+    const std::uint64_t key = key_of(p, config_.voxel_m);
+    std::size_t slot = slot_of(key);
+    if (slots_[slot] == 0) {
+      if (voxels_.size() >= static_cast<std::size_t>(config_.max_points)) {
+        ++refused_;
+        continue;
+      }
+      if (2 * (voxels_.size() + 1) > slots_.size()) {
+        grow();
+        slot = slot_of(key);
+      }
+      voxels_.push_back({key, p, 1});
+      slots_[slot] = static_cast<std::uint32_t>(voxels_.size());
+      continue;
+    }
+    Voxel& voxel = voxels_[slots_[slot] - 1];
+    if (voxel.count >= kMaxCount) continue;
+    ++voxel.count;
+    voxel.mean += (p - voxel.mean) / static_cast<float>(voxel.count);
+  }
+}
+
+std::vector<Vec3f> PointCloudMap::points() const {
+  std::vector<Vec3f> out;
+  out.reserve(voxels_.size());
+  for (const Voxel& voxel : voxels_) out.push_back(voxel.mean);
+  return out;
+}
+
+}  // namespace arex

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "exploration/candidate.h"
+#include "exploration/exploration_space.h"
+
+namespace arex {
+
+struct CandidateFilterConfig {
+  double obstacle_distance_m = 0.4;  ///< case A
+  double min_gain_m2 = 0.2;          ///< case B (rrt_exploration)
+  double max_angle_rad = 2.1;        ///< case C: 120 deg; the paper prints no value
+
+  void fields(auto& f) {
+    f("obstacle_distance_m", obstacle_distance_m, "case A: nearer to an obstacle is dropped");
+    f("min_gain_m2", min_gain_m2, "case B: less unknown area is dropped (rrt_exploration)");
+    f("max_angle_rad", max_angle_rad,
+      "case C: further from the exploration direction is dropped, unless that leaves none; only "
+      "where direction-aware");
+    f.check(obstacle_distance_m >= 0, "obstacle_distance_m >= 0");
+    f.check(min_gain_m2 >= 0, "min_gain_m2 >= 0");
+    f.check(max_angle_rad >= 0, "max_angle_rad >= 0");
+  }
+};
+
+/// Cases A and B of the paper's figure, by what the map says about the candidate.
+void apply_map_filters(std::vector<Candidate>& candidates, const ExplorationSpace& space,
+                       const CandidateFilterConfig& config);
+
+/// Case C of the paper's figure, by the candidates' A; does nothing if it would leave none.
+void apply_direction_filter(std::vector<Candidate>& candidates,
+                            const CandidateFilterConfig& config);
+
+}  // namespace arex

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+
+#include "messages/sensors.h"
+
+namespace arex {
+
+struct ConsumptionConfig {
+  double capacity_wh = 59.2;           ///< 4S 4000 mAh (reference.md, section 1)
+  double internal_resistance = 0.028;  ///< ohm, with wiring (reference.md, section 1)
+  double prior_power_w = 258;          ///< hover (reference.md, section 1)
+  double prior_weight_s = 20;
+  double speed_bin_mps = 0.5;
+
+  void fields(auto& f) {
+    f("capacity_wh", capacity_wh, "energy of the full battery");
+    f("internal_resistance", internal_resistance, "of the battery with its wiring, ohm");
+    f("prior_power_w", prior_power_w, "power at any speed until it has been measured");
+    f("prior_weight_s", prior_weight_s, "seconds of flight that the prior counts for");
+    f("speed_bin_mps", speed_bin_mps, "width of the speed classes");
+    f.check(capacity_wh > 0, "capacity_wh > 0");
+    f.check(internal_resistance >= 0, "internal_resistance >= 0");
+    f.check(prior_power_w > 0, "prior_power_w > 0");
+    f.check(prior_weight_s > 0, "prior_weight_s > 0");
+    f.check(speed_bin_mps > 0, "speed_bin_mps > 0");
+  }
+};
+
+/// Power as a function of speed, learned from the measured battery power, and the energy used. All
+/// powers are those inside the battery, its own loss included: U I + R I^2. A plain value: a job
+/// may take a copy.
+class ConsumptionModel {
+ public:
+  ConsumptionModel() = default;
+  explicit ConsumptionModel(const ConsumptionConfig& config) : config_(config) {}
+
+  /// Adds a reading taken at a speed (m/s); it stands for the time since the one before. Readings
+  /// on the ground count as energy used, but teach nothing about flying.
+  /// @pre stamps ascend.
+  void add(const BatterySample& sample, double speed_mps, bool flying);
+
+  /// Mean power at a speed, W; linear between the middles of the speed classes. A class with little
+  /// data leans on the prior, or on the flight so far where that was dearer.
+  [[nodiscard]] double power_w(double speed_mps) const;
+  [[nodiscard]] double used_wh() const { return used_ws_ / 3600; }
+  [[nodiscard]] double left_wh() const { return config_.capacity_wh - used_wh(); }
+  [[nodiscard]] const ConsumptionConfig& config() const { return config_; }
+
+ private:
+  static constexpr std::size_t kBins = 12;
+  struct Bin {
+    double energy_ws = 0;
+    double time_s = 0;
+  };
+
+  ConsumptionConfig config_;
+  std::array<Bin, kBins> bins_{};
+  Bin flight_;
+  double used_ws_ = 0;
+  Stamp last_ = -1;
+};
+
+}  // namespace arex

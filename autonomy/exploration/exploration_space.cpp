@@ -1,0 +1,272 @@
+#include "exploration/exploration_space.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "exploration/line_walk.h"
+
+namespace arex {
+namespace {
+
+// Straight and diagonal steps in integers: 99/70 is the square root of 2 to 4 digits, and integer
+// costs make a whole priority queue of a ring of buckets.
+constexpr std::uint32_t kStraight = 70, kDiagonal = 99;
+constexpr std::int32_t kNoObstacle = std::numeric_limits<std::int32_t>::max();
+
+/// Where a horizontal line crosses the polygon, in ascending order (even-odd rule).
+std::vector<double> crossings(const std::vector<Vec2>& polygon, double y) {
+  std::vector<double> xs;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2& a = polygon[i];
+    const Vec2& b = polygon[(i + 1) % polygon.size()];
+    if ((a.y() > y) == (b.y() > y)) continue;
+    xs.push_back(a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x()));
+  }
+  std::sort(xs.begin(), xs.end());
+  return xs;
+}
+
+bool is_between_crossings(const std::vector<double>& xs, double x) {
+  return (std::upper_bound(xs.begin(), xs.end(), x) - xs.begin()) % 2 == 1;
+}
+
+}  // namespace
+
+bool ExplorationBounds::contains(const Vec2& p) const {
+  if ((p.array() < low_m.array()).any() || (p.array() > high_m.array()).any()) return false;
+  return polygon_m.empty() || is_between_crossings(crossings(polygon_m, p.y()), p.x());
+}
+
+ExplorationSpace::ExplorationSpace(const OccupancyMap2D& map, const ExplorationBounds& bounds,
+                                   const SpaceConfig& config, const Vec2& robot)
+    : map_(map), bounds_(bounds), config_(config) {
+  classify();
+  measure_clearance();
+  travel_.assign(flags_.size(), kFar);
+  find_start(robot);
+  if (has_start_) flood(robot);
+}
+
+void ExplorationSpace::classify() {
+  const auto width = static_cast<std::size_t>(map_.width);
+  flags_.assign(map_.cells.size(), 0);
+  unknown_count_.assign((width + 1) * static_cast<std::size_t>(map_.height), 0);
+  for (int y = 0; y < map_.height; ++y) {
+    const Vec2 row = map_.centre_of({0, y});
+    const bool row_inside = row.y() >= bounds_.low_m.y() && row.y() <= bounds_.high_m.y();
+    const std::vector<double> xs = crossings(bounds_.polygon_m, row.y());
+    const std::size_t base = static_cast<std::size_t>(y) * width;
+    std::int32_t* count = unknown_count_.data() + static_cast<std::size_t>(y) * (width + 1);
+    for (std::size_t x = 0; x < width; ++x) {
+      const double at = row.x() + map_.resolution * static_cast<double>(x);
+      const bool inside = row_inside && at >= bounds_.low_m.x() && at <= bounds_.high_m.x() &&
+                          (bounds_.polygon_m.empty() || is_between_crossings(xs, at));
+      const std::int8_t state = map_.cells[base + x];
+      std::uint8_t flags = inside ? kInside : std::uint8_t{0};
+      if (state == OccupancyMap2D::kFree) flags |= kFree;
+      if (state == OccupancyMap2D::kUnknown && inside) flags |= kUnknown;
+      flags_[base + x] = flags;
+      count[x + 1] = count[x] + ((flags & kUnknown) != 0 ? 1 : 0);
+    }
+  }
+}
+
+/// Exact squared distance transform, then the cells that the vehicle's centre may pass.
+/// Source: Meijster, Roerdink and Hesselink, A general algorithm for computing distance transforms
+/// in linear time, 2000.
+void ExplorationSpace::measure_clearance() {
+  const int width = map_.width, height = map_.height;
+  const int none = width + height;  // further than any cell
+  clearance_.assign(flags_.size(), kNoObstacle);
+  std::vector<int> column(flags_.size(), none);  // to the nearest obstacle in the same column
+  const auto w = static_cast<std::size_t>(width);
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (map_.cells[i] == OccupancyMap2D::kOccupied) {
+      column[i] = 0;
+    } else if (i >= w) {
+      column[i] = std::min(none, column[i - w] + 1);
+    }
+  }
+  for (std::size_t i = column.size(); i-- > w;) {
+    column[i - w] = std::min(column[i - w], column[i] + 1);
+  }
+  const double radius_cells = config_.travel_radius_m / map_.resolution;
+  const double passable = radius_cells * radius_cells - 1e-6;
+  std::vector<int> site(w), from(w);  // the lower envelope: its parabolas and where each begins
+  for (int y = 0; y < height; ++y) {
+    const std::size_t base = static_cast<std::size_t>(y) * w;
+    int top = -1;
+    const auto value = [&](int x, int i) {
+      const int g = column[base + static_cast<std::size_t>(i)];
+      return (x - i) * (x - i) + g * g;
+    };
+    for (int u = 0; u < width; ++u) {
+      if (column[base + static_cast<std::size_t>(u)] >= none) continue;
+      while (top >= 0) {
+        const auto t = static_cast<std::size_t>(top);
+        if (value(from[t], site[t]) <= value(from[t], u)) break;
+        --top;
+      }
+      int begin = 0;
+      if (top >= 0) {
+        const int i = site[static_cast<std::size_t>(top)];
+        const int rise = value(0, u) - value(0, i);  // u^2 - i^2 + g(u)^2 - g(i)^2
+        begin = 1 + static_cast<int>(std::floor(static_cast<double>(rise) / (2 * (u - i))));
+      }
+      if (begin >= width) continue;
+      ++top;
+      site[static_cast<std::size_t>(top)] = u;
+      from[static_cast<std::size_t>(top)] = begin;
+    }
+    for (int x = width - 1; x >= 0; --x) {
+      const std::size_t i = base + static_cast<std::size_t>(x);
+      if (top >= 0) {
+        const auto t = static_cast<std::size_t>(top);
+        clearance_[i] = value(x, site[t]);
+        if (x == from[t]) --top;
+      }
+      if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kPassable;
+    }
+  }
+}
+
+template <class Accepts>
+std::optional<Eigen::Vector2i> ExplorationSpace::nearest_cell(const Vec2& p,
+                                                              Accepts&& accepts) const {
+  const Eigen::Vector2i centre = map_.cell_of(p);
+  if (map_.contains(centre) && accepts(centre)) return centre;
+  const int reach = static_cast<int>(std::ceil(config_.start_reach_m / map_.resolution));
+  std::optional<Eigen::Vector2i> nearest;
+  double best = config_.start_reach_m;
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      const Eigen::Vector2i cell = centre + Eigen::Vector2i(dx, dy);
+      if (!map_.contains(cell) || !accepts(cell)) continue;
+      const double distance = (map_.centre_of(cell) - p).norm();
+      if (distance >= best) continue;
+      bool blocked = false;
+      walk_line(map_, p, map_.centre_of(cell), [&](const Eigen::Vector2i& c) {
+        blocked = map_.at(c) == OccupancyMap2D::kOccupied && c != centre;
+        return !blocked;
+      });
+      if (blocked) continue;
+      best = distance;
+      nearest = cell;
+    }
+  }
+  return nearest;
+}
+
+void ExplorationSpace::find_start(const Vec2& robot) {
+  const auto cell = nearest_cell(
+      robot, [&](const Eigen::Vector2i& c) { return (flags_[map_.index(c)] & kPassable) != 0; });
+  has_start_ = cell.has_value();
+  if (!cell) return;
+  start_ = *cell == map_.cell_of(robot) ? robot : map_.centre_of(*cell);
+}
+
+std::optional<Eigen::Vector2i> ExplorationSpace::nearest_reachable(const Vec2& p) const {
+  return nearest_cell(p, [&](const Eigen::Vector2i& c) { return is_reachable(c); });
+}
+
+void ExplorationSpace::flood(const Vec2& robot) {
+  constexpr std::size_t kRing = kDiagonal + 1;
+  std::array<std::vector<std::uint32_t>, kRing> buckets;
+  const int width = map_.width;
+  const std::size_t first = map_.index(map_.cell_of(start_));
+  travel_[first] = static_cast<std::uint32_t>(
+      std::lround((start_ - robot).norm() / map_.resolution * kStraight));
+  std::uint32_t cost = travel_[first];
+  buckets[cost % kRing].push_back(static_cast<std::uint32_t>(first));
+  std::size_t open = 1;
+  const std::array<int, 4> dx{1, 0, -1, 0}, dy{0, 1, 0, -1};
+  for (; open > 0; ++cost) {
+    std::vector<std::uint32_t>& bucket = buckets[cost % kRing];
+    for (std::size_t k = 0; k < bucket.size(); ++k) {  // steps are longer than 0: it does not grow
+      --open;
+      const std::uint32_t i = bucket[k];
+      if (travel_[i] != cost) continue;
+      const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
+      const auto relax = [&](std::size_t to, std::uint32_t step) {
+        if (cost + step >= travel_[to]) return;
+        travel_[to] = cost + step;
+        buckets[(cost + step) % kRing].push_back(static_cast<std::uint32_t>(to));
+        ++open;
+      };
+      std::array<bool, 4> side{};
+      const auto neighbour = [&](int ax, int ay) {
+        return static_cast<std::size_t>(y + ay) * static_cast<std::size_t>(width) +
+               static_cast<std::size_t>(x + ax);
+      };
+      for (std::size_t s = 0; s < 4; ++s) {
+        if (!map_.contains({x + dx[s], y + dy[s]})) continue;
+        const std::size_t to = neighbour(dx[s], dy[s]);
+        side[s] = (flags_[to] & kPassable) != 0;
+        if (side[s]) relax(to, kStraight);
+      }
+      for (std::size_t s = 0; s < 4; ++s) {
+        const std::size_t t = (s + 1) % 4;
+        if (!side[s] || !side[t]) continue;
+        const std::size_t to = neighbour(dx[s] + dx[t], dy[s] + dy[t]);
+        if ((flags_[to] & kPassable) != 0) relax(to, kDiagonal);
+      }
+    }
+    bucket.clear();
+  }
+}
+
+bool ExplorationSpace::is_frontier(const Eigen::Vector2i& cell) const {
+  return is_unknown(cell) &&
+         (is_free({cell.x() - 1, cell.y()}) || is_free({cell.x() + 1, cell.y()}) ||
+          is_free({cell.x(), cell.y() - 1}) || is_free({cell.x(), cell.y() + 1}));
+}
+
+double ExplorationSpace::clearance(const Eigen::Vector2i& cell) const {
+  if (!map_.contains(cell)) return 0;
+  const std::int32_t squared = clearance_[map_.index(cell)];
+  if (squared == kNoObstacle) return std::numeric_limits<double>::infinity();
+  return map_.resolution * std::sqrt(static_cast<double>(squared));
+}
+
+double ExplorationSpace::travel_distance(const Eigen::Vector2i& cell) const {
+  if (!is_reachable(cell)) return kUnreachable;
+  return map_.resolution * travel_[map_.index(cell)] / kStraight;
+}
+
+double ExplorationSpace::unknown_area(const Vec2& p) const {
+  const double radius = config_.information_radius_m;
+  const Vec2 low = (p - map_.origin - Vec2::Constant(radius)) / map_.resolution;
+  const Vec2 high = (p - map_.origin + Vec2::Constant(radius)) / map_.resolution;
+  const int y_first = std::max(0, static_cast<int>(std::floor(low.y())));
+  const int y_last = std::min(map_.height - 1, static_cast<int>(std::floor(high.y())));
+  std::int64_t count = 0;
+  for (int y = y_first; y <= y_last; ++y) {
+    const double dy = map_.centre_of({0, y}).y() - p.y();
+    const double half2 = radius * radius - dy * dy + 1e-9;
+    if (half2 < 0) continue;
+    // Cells whose centres lie between these two, in cell units.
+    const double half = std::sqrt(half2) / map_.resolution;
+    const double middle = (p.x() - map_.origin.x()) / map_.resolution - 0.5;
+    const int x_first = std::max(0, static_cast<int>(std::ceil(middle - half)));
+    const int x_end = std::min(map_.width, static_cast<int>(std::floor(middle + half)) + 1);
+    if (x_first >= x_end) continue;
+    const std::int32_t* row =
+        unknown_count_.data() +
+        static_cast<std::size_t>(y) * (static_cast<std::size_t>(map_.width) + 1);
+    count += row[x_end] - row[x_first];
+  }
+  return static_cast<double>(count) * map_.resolution * map_.resolution;
+}
+
+bool ExplorationSpace::sees(const Vec2& from, const Eigen::Vector2i& target) const {
+  bool clear = true;
+  walk_line(map_, from, map_.centre_of(target), [&](const Eigen::Vector2i& cell) {
+    if (cell == target) return false;
+    clear = is_free(cell);
+    return clear;
+  });
+  return clear;
+}
+
+}  // namespace arex

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "mapping/occupancy_map_2d.h"
+
+namespace arex {
+
+/// The area to explore, in O: a box, and inside it a polygon where one is given.
+struct ExplorationBounds {
+  Vec2 low_m{-25, -20};  ///< paper, Scene 1: 25 m ahead and behind, 20 m to either side
+  Vec2 high_m{25, 20};
+  std::vector<Vec2> polygon_m;  ///< corners in order; empty: the whole box
+
+  [[nodiscard]] bool contains(const Vec2& p) const;
+
+  void fields(auto& f) {
+    f("low_m", low_m, "lower corner of the exploration bounds in O (paper, Scene 1)");
+    f("high_m", high_m, "upper corner of the exploration bounds in O (paper, Scene 1)");
+    f("polygon_m", polygon_m, "corners of a polygon that narrows the box; empty: the whole box");
+    f.check((low_m.array() < high_m.array()).all(), "low_m < high_m");
+    f.check(polygon_m.empty() || polygon_m.size() >= 3, "polygon_m has 3 corners or more");
+  }
+};
+
+struct SpaceConfig {
+  double travel_radius_m = 0.5;  ///< what the planner keeps (paper, IV-A: inflation)
+  double start_reach_m = 1.5;
+  double information_radius_m = 1.0;
+
+  void fields(auto& f) {
+    f("travel_radius_m", travel_radius_m,
+      "distance from obstacles at which the vehicle's centre may pass: the planner's inflation");
+    f("start_reach_m", start_reach_m,
+      "how far from the vehicle the known-free space may begin: cells below it may be unseen");
+    f("information_radius_m", information_radius_m,
+      "radius of the disc whose unknown area is f_I (rrt_exploration)");
+    f.check(travel_radius_m >= 0, "travel_radius_m >= 0");
+    f.check(start_reach_m >= 0, "start_reach_m >= 0");
+    f.check(information_radius_m > 0, "information_radius_m > 0");
+  }
+};
+
+/// What one exploration decision needs to know of the map, computed once and then looked up: what
+/// is free or unknown inside the bounds, how far the nearest obstacle is, where the vehicle can go
+/// through known-free space and how far that is, how much is unknown around a point.
+/// Positions in O; distances in m. The map must outlive this; what lies outside the map's array is
+/// not explored.
+class ExplorationSpace {
+ public:
+  static constexpr double kUnreachable = std::numeric_limits<double>::infinity();
+
+  ExplorationSpace(const OccupancyMap2D& map, const ExplorationBounds& bounds,
+                   const SpaceConfig& config, const Vec2& robot);
+
+  [[nodiscard]] const OccupancyMap2D& map() const { return map_; }
+  [[nodiscard]] const ExplorationBounds& bounds() const { return bounds_; }
+  [[nodiscard]] double information_radius_m() const { return config_.information_radius_m; }
+
+  [[nodiscard]] bool is_free(const Eigen::Vector2i& cell) const {
+    return map_.contains(cell) && (flags_[map_.index(cell)] & kFree) != 0;
+  }
+  /// Unknown, and inside the bounds: worth seeing.
+  [[nodiscard]] bool is_unknown(const Eigen::Vector2i& cell) const {
+    return map_.contains(cell) && (flags_[map_.index(cell)] & kUnknown) != 0;
+  }
+  [[nodiscard]] bool is_inside(const Eigen::Vector2i& cell) const {
+    return map_.contains(cell) && (flags_[map_.index(cell)] & kInside) != 0;
+  }
+  /// An unknown cell inside the bounds that shares a side with a known-free one.
+  [[nodiscard]] bool is_frontier(const Eigen::Vector2i& cell) const;
+
+  /// Between the centres of a cell and of the nearest occupied one; infinite without any.
+  [[nodiscard]] double clearance(const Eigen::Vector2i& cell) const;
+
+  /// Whether the vehicle stands in or beside known-free space that it can leave.
+  [[nodiscard]] bool has_start() const { return has_start_; }
+  /// Where its known-free space begins: the nearest passable point to the vehicle.
+  [[nodiscard]] const Vec2& start() const { return start_; }
+  [[nodiscard]] bool is_reachable(const Eigen::Vector2i& cell) const {
+    return map_.contains(cell) && travel_[map_.index(cell)] != kFar;
+  }
+  /// Length of the shortest 8-connected way from the vehicle through known-free cells at the travel
+  /// radius, corners not cut; kUnreachable if there is none.
+  [[nodiscard]] double travel_distance(const Eigen::Vector2i& cell) const;
+
+  /// The reachable cell nearest to p within the start reach; none if there is none.
+  [[nodiscard]] std::optional<Eigen::Vector2i> nearest_reachable(const Vec2& p) const;
+
+  /// f_I: unknown area, m^2, of the cells inside the bounds whose centres lie within the
+  /// information radius of p.
+  [[nodiscard]] double unknown_area(const Vec2& p) const;
+
+  /// Whether every cell on the line up to `target` is known-free; the target's own is not looked
+  /// at.
+  [[nodiscard]] bool sees(const Vec2& from, const Eigen::Vector2i& target) const;
+
+ private:
+  static constexpr std::uint8_t kFree = 1, kUnknown = 2, kInside = 4, kPassable = 8;
+  static constexpr std::uint32_t kFar = std::numeric_limits<std::uint32_t>::max();
+
+  void classify();
+  void measure_clearance();
+  void find_start(const Vec2& robot);
+  /// Nearest cell to p for which `accepts(cell)` holds, within the start reach and on p's side of
+  /// any obstacle.
+  template <class Accepts>
+  [[nodiscard]] std::optional<Eigen::Vector2i> nearest_cell(const Vec2& p, Accepts&& accepts) const;
+  void flood(const Vec2& robot);
+
+  const OccupancyMap2D& map_;
+  ExplorationBounds bounds_;
+  SpaceConfig config_;
+  std::vector<std::uint8_t> flags_;
+  std::vector<std::int32_t> clearance_;      ///< squared, in cells
+  std::vector<std::uint32_t> travel_;        ///< in kStraight per cell
+  std::vector<std::int32_t> unknown_count_;  ///< unknown cells left of x, rows of width + 1
+  Vec2 start_ = Vec2::Zero();
+  bool has_start_ = false;
+};
+
+}  // namespace arex

@@ -1,0 +1,179 @@
+#include "exploration/explorer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace arex {
+
+Explorer::Explorer(const ExplorerConfig& config, double resolution_m, std::uint64_t seed)
+    : config_(config),
+      detector_(config.detector, seed),
+      viewpoints_(config.viewpoint, resolution_m),
+      blacklist_(config.blacklist) {}
+
+Decision Explorer::decide(const OccupancyMap2D& map, const ExplorerInput& input) {
+  Decision decision;
+  decision.stamp = input.now;
+  decision.sequence = sequence_++;
+  const ExplorationSpace space(map, config_.bounds, config_.space, input.p_OB.head<2>());
+  detector_.update(space);
+  balance(decision, space, input);
+  decision.previous_end = settle_target(space, input);
+  if (decision.energy.must_stop()) {
+    decision.kind = DecisionKind::kStop;
+    decision.stop_reason = StopReason::kBattery;
+    target_.reset();
+  } else if (target_) {
+    decision.kind = DecisionKind::kKeepTarget;
+    set_goal(decision);
+  } else if (!space.has_start()) {
+    decision.kind = DecisionKind::kWait;
+  } else {
+    choose(decision, space, input);
+  }
+  return decision;
+}
+
+void Explorer::balance(Decision& decision, const ExplorationSpace& space,
+                       const ExplorerInput& input) const {
+  const double straight = (input.home_O - input.p_OB).head<2>().norm();
+  const auto home = space.nearest_reachable(input.home_O.head<2>());
+  // What lies between home and the known-free space is taken straight.
+  decision.home_distance_m =
+      home ? space.travel_distance(*home) +
+                 (space.map().centre_of(*home) - input.home_O.head<2>()).norm()
+           : config_.stop.detour_factor * straight;
+  decision.home_distance_m = std::max(decision.home_distance_m, straight);
+  decision.energy = balance_energy(input.energy, decision.home_distance_m, config_.stop);
+}
+
+TargetEnd Explorer::settle_target(const ExplorationSpace& space, const ExplorerInput& input) {
+  if (!target_) return TargetEnd::kNone;
+  const Vec2 point = target_->point;
+  const auto end = [&](TargetEnd how) {
+    target_.reset();
+    return how;
+  };
+  switch (input.progress) {
+    case TargetProgress::kUnreachable:
+      blacklist_.strike(point, input.now);
+      return end(TargetEnd::kUnreachable);
+    case TargetProgress::kReached:
+      if (!space.is_frontier(space.map().cell_of(point))) return end(TargetEnd::kReached);
+      blacklist_.strike(point, input.now);
+      return end(TargetEnd::kStillUnknown);
+    case TargetProgress::kUnderWay:
+      break;
+  }
+  if (config_.reevaluate && !is_worthwhile(space, point)) {
+    if (config_.legs_as_flown) history_.last = input.p_OB.head<2>();
+    return end(TargetEnd::kSeen);
+  }
+  if (space.has_start() && !space.is_reachable(space.map().cell_of(target_->viewpoint))) {
+    const auto other = viewpoints_.find(space, point, target_->viewpoint);
+    if (!other) {
+      if (config_.legs_as_flown) history_.last = input.p_OB.head<2>();
+      return end(TargetEnd::kCutOff);
+    }
+    target_->viewpoint = *other;
+  }
+  return TargetEnd::kNone;
+}
+
+bool Explorer::is_worthwhile(const ExplorationSpace& space, const Vec2& point) const {
+  if (space.unknown_area(point) < config_.filter.min_gain_m2) return false;
+  // The unknown behind a wall stays unknown for ever: only what borders free space counts.
+  const OccupancyMap2D& map = space.map();
+  const Eigen::Vector2i centre = map.cell_of(point);
+  const int reach = static_cast<int>(space.information_radius_m() / map.resolution);
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      const Eigen::Vector2i cell = centre + Eigen::Vector2i(dx, dy);
+      if (dx * dx + dy * dy <= reach * reach && space.is_frontier(cell) &&
+          space.clearance(cell) >= config_.filter.obstacle_distance_m) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+std::vector<Candidate> Explorer::assess(CandidateSource source, const ExplorationSpace& space,
+                                        const ExplorerInput& input) const {
+  std::vector<FrontierPoint> points;
+  if (source == CandidateSource::kTrees) {
+    points = detector_.points();
+  } else {
+    for (const Frontier& frontier : find_frontiers(space)) {
+      points.insert(points.end(), frontier.points.begin(), frontier.points.end());
+    }
+  }
+  std::vector<Candidate> candidates;
+  for (const FrontierPoint& p : points) {
+    Candidate& c = candidates.emplace_back();
+    c.point = p.point;
+    c.seen_from = p.seen_from;
+    c.information_m2 = space.unknown_area(p.point);
+    const bool barred = source == CandidateSource::kForgiving ? blacklist_.gave_up(p.point)
+                                                              : blacklist_.bars(p.point, input.now);
+    if (barred) c.verdict = Verdict::kBlacklisted;
+  }
+  apply_map_filters(candidates, space, config_.filter);
+  for (Candidate& c : candidates) {
+    if (c.verdict != Verdict::kKept) continue;
+    const auto viewpoint = viewpoints_.find(space, c.point, c.seen_from);
+    if (!viewpoint) {
+      c.verdict = Verdict::kNoViewpoint;
+      continue;
+    }
+    c.viewpoint = *viewpoint;
+    c.distance_m = config_.revenue.distance == DistanceKind::kEuclidean
+                       ? (c.point - input.p_OB.head<2>()).norm()
+                       : space.travel_distance(space.map().cell_of(c.viewpoint)) +
+                             (c.point - c.viewpoint).norm();
+    c.angle_rad = direction_angle(history_, c.point);
+    evaluate_revenue(c, config_.revenue);
+  }
+  return candidates;
+}
+
+void Explorer::choose(Decision& decision, const ExplorationSpace& space,
+                      const ExplorerInput& input) {
+  double most_m2 = 0;
+  bool any = false;
+  for (const auto source :
+       {CandidateSource::kTrees, CandidateSource::kExhaustive, CandidateSource::kForgiving}) {
+    decision.source = source;
+    decision.candidates = assess(source, space, input);
+    any = false;
+    for (const Candidate& c : decision.candidates) {
+      if (c.verdict != Verdict::kKept) continue;
+      any = true;
+      most_m2 = std::max(most_m2, c.information_m2);
+    }
+    if (any && most_m2 >= config_.stop.min_area_m2) break;
+  }
+  if (!any || most_m2 < config_.stop.min_area_m2) {
+    decision.kind = DecisionKind::kStop;
+    decision.stop_reason = any ? StopReason::kLittleLeft : StopReason::kNoCandidates;
+    return;
+  }
+  if (config_.revenue.direction_aware) {
+    apply_direction_filter(decision.candidates, config_.filter);
+  }
+  decision.winner = best_candidate(decision.candidates);
+  const Candidate& winner = decision.candidates[*decision.winner];
+  target_ = Target{winner.point, winner.viewpoint};
+  history_.push(winner.point);
+  decision.kind = DecisionKind::kNewTarget;
+  set_goal(decision);
+}
+
+void Explorer::set_goal(Decision& decision) const {
+  const Vec2 look = target_->point - target_->viewpoint;
+  decision.target = target_->point;
+  decision.goal_O = {target_->viewpoint.x(), target_->viewpoint.y(), config_.flight_height_m};
+  decision.goal_yaw_rad = std::atan2(look.y(), look.x());
+}
+
+}  // namespace arex

@@ -1,0 +1,213 @@
+#include "exploration/exploration_space.h"
+
+#include <gtest/gtest.h>
+
+#include <queue>
+
+#include "autonomy/exploration/test_map.h"
+
+namespace arex {
+namespace {
+
+ExplorationBounds wide() { return {Vec2(-100, -100), Vec2(100, 100), {}}; }
+
+Vec2 random_in(const OccupancyMap2D& map, RandomStream& random) {
+  const double x = random.uniform(0, map.width * map.resolution);
+  const double y = random.uniform(0, map.height * map.resolution);
+  return map.origin + Vec2(x, y);
+}
+
+TEST(LineWalk, VisitsTheCellsThatDenseSamplingFinds) {
+  const OccupancyMap2D map = test::make_map(60, 50, OccupancyMap2D::kFree);
+  RandomStream random(1, "line_walk");
+  for (int trial = 0; trial < 300; ++trial) {
+    const Vec2 a = random_in(map, random);
+    const Vec2 b =
+        trial % 5 == 0 ? Vec2(a.x(), random_in(map, random).y()) : random_in(map, random);
+    std::vector<Eigen::Vector2i> walked;
+    walk_line(map, a, b, [&](const Eigen::Vector2i& cell) {
+      walked.push_back(cell);
+      return true;
+    });
+    EXPECT_EQ(walked.front(), map.cell_of(a));
+    EXPECT_EQ(walked.back(), map.cell_of(b));
+    for (std::size_t i = 1; i < walked.size(); ++i) {
+      ASSERT_EQ((walked[i] - walked[i - 1]).cwiseAbs().sum(), 1);
+    }
+    constexpr int kSamples = 20000;
+    std::size_t at = 0;
+    for (int i = 0; i <= kSamples; ++i) {  // every sampled cell occurs, in the same order
+      const Eigen::Vector2i cell = map.cell_of(a + (b - a) * (static_cast<double>(i) / kSamples));
+      while (at < walked.size() && walked[at] != cell) ++at;
+      ASSERT_LT(at, walked.size());
+    }
+    for (const Eigen::Vector2i& cell : walked) {  // and no cell that the segment does not touch
+      const Vec2 centre = map.centre_of(cell);
+      const double t = std::clamp((centre - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+      ASSERT_LE((a + t * (b - a) - centre).norm(), 0.1 * M_SQRT1_2 + 1e-9);
+    }
+  }
+}
+
+TEST(LineWalk, StopsWhereItIsTold) {
+  const OccupancyMap2D map = test::make_map(20, 20, OccupancyMap2D::kFree);
+  int visited = 0;
+  walk_line(map, Vec2(-0.95, 0.05), Vec2(0.95, 0.05),
+            [&](const Eigen::Vector2i&) { return ++visited < 7; });
+  EXPECT_EQ(visited, 7);
+}
+
+TEST(ExplorationSpace, ClearanceIsTheDistanceToTheNearestOccupiedCentre) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    RandomStream random(seed, "clearance");
+    const OccupancyMap2D map = test::random_map(70, 50, random);
+    const ExplorationSpace space(map, wide(), {}, Vec2::Zero());
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        int best = 1 << 20;
+        for (int v = 0; v < map.height; ++v) {
+          for (int u = 0; u < map.width; ++u) {
+            if (map.at({u, v}) == OccupancyMap2D::kOccupied) {
+              best = std::min(best, (u - x) * (u - x) + (v - y) * (v - y));
+            }
+          }
+        }
+        ASSERT_NEAR(space.clearance({x, y}), 0.1 * std::sqrt(best), 1e-9) << x << " " << y;
+      }
+    }
+  }
+}
+
+TEST(ExplorationSpace, WithoutObstaclesTheClearanceIsInfinite) {
+  const OccupancyMap2D map = test::make_map(20, 20, OccupancyMap2D::kFree);
+  const ExplorationSpace space(map, wide(), {}, Vec2::Zero());
+  EXPECT_TRUE(std::isinf(space.clearance({3, 4})));
+  EXPECT_TRUE(space.is_reachable({0, 0}));
+}
+
+/// Dijkstra over the free cells at the radius, diagonals only between two passable sides.
+std::vector<double> brute_force_travel(const OccupancyMap2D& map, const ExplorationSpace& space,
+                                       double radius, const Eigen::Vector2i& start) {
+  const auto passable = [&](int x, int y) {
+    return map.contains({x, y}) && map.at({x, y}) == OccupancyMap2D::kFree &&
+           space.clearance({x, y}) >= radius - 1e-9;
+  };
+  std::vector<double> distance(map.cells.size(), 1e18);
+  using Entry = std::pair<double, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  distance[map.index(start)] = 0;
+  queue.emplace(0, map.index(start));
+  while (!queue.empty()) {
+    const auto [d, i] = queue.top();
+    queue.pop();
+    if (d > distance[i]) continue;
+    const int x = static_cast<int>(i) % map.width, y = static_cast<int>(i) / map.width;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        if ((dx == 0 && dy == 0) || !passable(x + dx, y + dy)) continue;
+        if (!passable(x + dx, y) || !passable(x, y + dy)) continue;
+        const double next = d + 0.1 * std::sqrt(static_cast<double>(dx * dx + dy * dy));
+        const std::size_t to = map.index({x + dx, y + dy});
+        if (next >= distance[to]) continue;
+        distance[to] = next;
+        queue.emplace(next, to);
+      }
+    }
+  }
+  return distance;
+}
+
+TEST(ExplorationSpace, TravelDistanceIsThatOfBruteForceDijkstra) {
+  int reachable = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    RandomStream random(seed, "travel");
+    OccupancyMap2D map = test::random_map(90, 70, random);
+    test::fill(map, {40, 30}, {50, 40}, OccupancyMap2D::kFree);
+    SpaceConfig config;
+    config.travel_radius_m = 0.25;
+    const Vec2 robot = map.centre_of({45, 35});
+    const ExplorationSpace space(map, wide(), config, robot);
+    ASSERT_TRUE(space.has_start());
+    const std::vector<double> expected =
+        brute_force_travel(map, space, config.travel_radius_m, map.cell_of(space.start()));
+    const double lead = (space.start() - robot).norm();
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        const double want = expected[map.index({x, y})];
+        ASSERT_EQ(space.is_reachable({x, y}), want < 1e17);
+        if (want > 1e17) continue;
+        ++reachable;
+        // 99/70 for the square root of two, and the lead rounded to 1/70 of a cell.
+        ASSERT_NEAR(space.travel_distance({x, y}), want + lead, 1e-4 * want + 0.1 / 70);
+      }
+    }
+  }
+  EXPECT_GT(reachable, 5000);
+}
+
+TEST(ExplorationSpace, UnknownAreaIsThatOfBruteForceInsideThePolygon) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    RandomStream random(seed, "area");
+    const OccupancyMap2D map = test::random_map(80, 60, random);
+    ExplorationBounds bounds{Vec2(-3.5, -2.5), Vec2(3, 2.7), {}};
+    // Not convex.
+    if (seed % 2 == 0)
+      bounds.polygon_m = {{-3, -2}, {3.3, -2.3}, {0.2, 0.1}, {2.9, 2.6}, {-3.2, 2}};
+    SpaceConfig config;
+    config.information_radius_m = random.uniform(0.4, 1.5);
+    const ExplorationSpace space(map, bounds, config, Vec2::Zero());
+    int different = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      const Vec2 p = trial % 2 == 0 ? map.centre_of(map.cell_of(random_in(map, random)))
+                                    : random_in(map, random);
+      int count = 0;
+      for (int y = 0; y < map.height; ++y) {
+        for (int x = 0; x < map.width; ++x) {
+          const Vec2 centre = map.centre_of({x, y});
+          count += map.at({x, y}) == OccupancyMap2D::kUnknown && bounds.contains(centre) &&
+                   (centre - p).squaredNorm() <= std::pow(config.information_radius_m, 2) + 1e-9;
+        }
+      }
+      ASSERT_NEAR(space.unknown_area(p), 0.01 * count, 1e-9);
+      different += count > 0;
+    }
+    EXPECT_GT(different, 50);
+  }
+}
+
+TEST(ExplorationBounds, APolygonNarrowsTheBox) {
+  const ExplorationBounds bounds{Vec2(-2, -2), Vec2(2, 2), {{-3, -3}, {3, -3}, {0, 1}}};
+  EXPECT_TRUE(bounds.contains({0, 0}));
+  EXPECT_FALSE(bounds.contains({0, 1.5}));   // above the triangle's tip
+  EXPECT_FALSE(bounds.contains({0, -2.5}));  // in the triangle, out of the box
+  EXPECT_FALSE(bounds.contains({1.5, 0}));   // in the box, right of the triangle
+  EXPECT_TRUE((ExplorationBounds{Vec2(-2, -2), Vec2(2, 2), {}}.contains({1.5, 0})));
+}
+
+TEST(ExplorationSpace, StartsWhereTheKnownBeginsButNotBehindAWall) {
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kUnknown);
+  test::fill(map, {40, 0}, {59, 59}, OccupancyMap2D::kFree);
+  const Vec2 robot = map.centre_of({33, 30});
+  const ExplorationSpace space(map, wide(), {}, robot);
+  ASSERT_TRUE(space.has_start());
+  EXPECT_EQ(map.cell_of(space.start()), Eigen::Vector2i(40, 30));
+  EXPECT_NEAR(space.travel_distance({45, 30}), 1.2, 1e-3);
+  test::fill(map, {38, 0}, {38, 59}, OccupancyMap2D::kOccupied);
+  EXPECT_FALSE(ExplorationSpace(map, wide(), {}, robot).has_start());
+}
+
+TEST(ExplorationSpace, GapsNarrowerThanTheVehicleAreNoWay) {
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kFree);
+  test::fill(map, {30, 0}, {30, 59}, OccupancyMap2D::kOccupied);
+  const Vec2 robot = map.centre_of({10, 30});
+  for (const int gap : {9, 11}) {  // cells; the centre keeps 0.5 m from both posts with 9 between
+    OccupancyMap2D open = map;
+    test::fill(open, {30, 20}, {30, 20 + gap - 1}, OccupancyMap2D::kFree);
+    SpaceConfig config;
+    config.travel_radius_m = 0.55;
+    EXPECT_EQ(ExplorationSpace(open, wide(), config, robot).is_reachable({50, 30}), gap == 11);
+  }
+}
+
+}  // namespace
+}  // namespace arex

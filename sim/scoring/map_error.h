@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "math/pose.h"
+#include "sensors/scene.h"
+#include "worlds/world.h"
+
+namespace arex::sim {
+
+struct MapErrorConfig {
+  double outlier_m = 0.3;
+  double foliage_m = 0.3;
+  double max_distance_m = 5.0;
+  int max_points = 200'000;
+
+  void fields(auto& f) {
+    f("outlier_m", outlier_m,
+      "a map point further from every true surface is an outlier (issue 3)");
+    f("foliage_m", foliage_m, "a map point nearest to foliage, and this near, is left out");
+    f("max_distance_m", max_distance_m, "distances are clamped to this");
+    f("max_points", max_points, "a larger cloud is sampled down to this");
+    f.check(outlier_m > 0 && foliage_m >= 0, "outlier_m > 0, foliage_m >= 0");
+    f.check(max_distance_m > outlier_m && max_distance_m > foliage_m,
+            "max_distance_m > outlier_m, foliage_m");
+    f.check(max_points > 0, "max_points > 0");
+  }
+};
+
+/// How far an estimated map lies from the true surfaces.
+struct MapScore {
+  std::size_t points = 0;       ///< of the cloud
+  std::size_t scored = 0;       ///< of those, measured
+  std::size_t foliage = 0;      ///< of those looked at, left out as foliage
+  double median_m = 0;          ///< of the distances to the nearest true surface
+  double p95_m = 0;             ///< their 95th percentile
+  double outlier_fraction = 0;  ///< share further than outlier_m
+};
+
+/// Leaves, shrubs and ferns: not a surface to be mapped.
+constexpr bool is_foliage(worlds::SurfaceClass c) {
+  return c == worlds::SurfaceClass::kLeaf || c == worlds::SurfaceClass::kShrub;
+}
+
+/// Exact distances of a cloud's points to the nearest true triangle, foliage included: a map point
+/// on a leaf is no error of the map. Points that foliage explains (nearer to it than to any solid
+/// surface, within foliage_m) are left out, so that its many small facets, to which any point in a
+/// crown is near, do not flatter the figures. A point in mid-air is not excused by the leaf that
+/// happens to be nearest: beyond foliage_m it counts.
+/// @param cloud_O the map's points in O, m; @param X_WO O in W, usually aligned at the start
+/// @param scene of `world`
+MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const worlds::World& world,
+                   const Scene& scene, const MapErrorConfig& config = {});
+
+}  // namespace arex::sim

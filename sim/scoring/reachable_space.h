@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "math/pose.h"
+#include "worlds/occupancy.h"
+
+namespace arex::sim {
+
+/// Where the vehicle's centre can get to from its start without leaving the exploration bounds.
+struct ReachableSpace {
+  worlds::GridGeometry grid;            ///< in W
+  std::vector<std::uint8_t> reachable;  ///< one per cell, 1 where it can
+  std::size_t count = 0;                ///< of those cells
+
+  [[nodiscard]] bool at(const Vec3& p_W) const {
+    const Eigen::Vector3i cell = grid.cell_of(p_W);
+    return grid.contains(cell) && reachable[grid.index(cell)] != 0;
+  }
+  [[nodiscard]] double volume_m3() const {
+    return static_cast<double>(count) * grid.resolution_m * grid.resolution_m * grid.resolution_m;
+  }
+};
+
+struct ReachableSpaceConfig {
+  double resolution_m = 0.1;
+  double start_search_m = 1.5;
+  double margin_m = 0.5;
+
+  void fields(auto& f) {
+    f("resolution_m", resolution_m, "cells of the true free space (the map's resolution)");
+    f("start_search_m", start_search_m, "how far above the start the vehicle first has room");
+    f("margin_m", margin_m, "surfaces this far outside the bounds still belong to them");
+    f.check(resolution_m > 0, "resolution_m > 0");
+    f.check(start_search_m >= 0 && margin_m >= 0, "start_search_m, margin_m >= 0");
+  }
+};
+
+/// Flood fill over face neighbours, leaves left out (they give way), from the first cell at or
+/// above O's origin where a sphere of the vehicle's radius fits. It neither passes nor ends outside
+/// the bounds, nor outside the world.
+/// @param X_WO O in W; level, as O is gravity-aligned. @param bounds_O in O, m
+/// @throws std::invalid_argument if the vehicle does not fit at its start
+ReachableSpace find_reachable_space(const worlds::World& world, const Pose& X_WO,
+                                    const worlds::Bounds& bounds_O, double vehicle_radius_m,
+                                    const ReachableSpaceConfig& config = {});
+
+}  // namespace arex::sim

@@ -51,9 +51,9 @@ class Viewpoints {
 bool sees(const Scene& scene, const Vec3& viewpoint_W, const SurfaceSample& sample,
           const VisibilityConfig& config);
 
-/// 1 for every sample that one of the viewpoints around it sees. Each answer of 1 has a witness; a
-/// few samples (measured: visibility_test) that only some further viewpoint sees get 0, and then
-/// count neither as to be seen nor as seen.
+/// 1 for every sample that one of the viewpoints around it sees. Each answer of 1 has a witness. A
+/// few samples that only some further viewpoint sees (0.3 % in the forest, 3 % in the garage, by
+/// trying them all) get 0, and then count neither as to be seen nor as seen.
 std::vector<std::uint8_t> find_visible(const Scene& scene, const Viewpoints& viewpoints,
                                        const std::vector<SurfaceSample>& samples,
                                        const VisibilityConfig& config);

@@ -125,6 +125,19 @@ TEST(CoverageScorer, AStartWithoutRoomIsRefused) {
   EXPECT_THROW(room_scorer(world, scene, {Mat3::Identity(), {3, 0.1, 1}}), std::invalid_argument);
 }
 
+TEST(CoverageScorer, WorksOutTheSameTruthEveryTime) {
+  const World world = two_rooms();
+  const Scene scene(world);
+  const Scene again(world);
+  const CoverageScorer a = room_scorer(world, scene);
+  const CoverageScorer b = room_scorer(world, again);
+  ASSERT_EQ(a.samples().size(), b.samples().size());
+  for (std::size_t i = 0; i < a.samples().size(); ++i) {
+    EXPECT_EQ(a.samples()[i].p_W, b.samples()[i].p_W);
+  }
+  EXPECT_EQ(a.area_cells_W(), b.area_cells_W());
+}
+
 // Samples near a mapped point, by brute force.
 TEST(CoverageScorer, MarksExactlyTheSamplesWithinReach) {
   const World world = two_rooms();

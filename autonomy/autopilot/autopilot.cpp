@@ -168,7 +168,7 @@ void Autopilot::update_targets(double dt) {
 void Autopilot::run_rate_loop() {
   if (!armed()) {
     motors_ = {};
-    demanded_thrust_n_ = 0;
+    demanded_thrust_n_.setZero();
     return;
   }
   const double low = motor_.idle_thrust();
@@ -181,15 +181,22 @@ void Autopilot::run_rate_loop() {
     rate_control_.integrate(result.achieved.torque_nm);
     thrust = result.rotor_thrust_n;
   }
-  demanded_thrust_n_ = thrust.sum();
+  demanded_thrust_n_ = thrust;
   for (int i = 0; i < 4; ++i) {
     motors_.throttle[static_cast<std::size_t>(i)] = motor_.throttle(thrust[i], voltage_v_);
   }
 }
 
 void Autopilot::follow_rotors(double dt) {
-  rotor_thrust_n_ +=
-      (demanded_thrust_n_ - rotor_thrust_n_) * dt / (dt + config_.motor.time_constant_s);
+  const double share = dt / (dt + config_.motor.time_constant_s);
+  // Braking at 45 degrees the air comes from below and adds a third to the thrust, though the
+  // vehicle neither climbs nor sinks: without it, that would look like support by the ground.
+  const double axial = ahrs_.R_AB().col(2).dot(ahrs_.velocity());
+  rotor_thrust_n_ = 0;
+  for (int i = 0; i < 4; ++i) {
+    rotor_radps_[i] += share * (motor_.speed(demanded_thrust_n_[i]) - rotor_radps_[i]);
+    rotor_thrust_n_ += motor_.thrust(rotor_radps_[i], axial);
+  }
 }
 
 }  // namespace arex

@@ -96,8 +96,9 @@ class Autopilot {
   double descent_integral_ = 0;  ///< m/s^2
   Vec3 rate_setpoint_ = Vec3::Zero();
   double thrust_setpoint_n_ = 0;
-  double rotor_thrust_n_ = 0;     ///< collective, of the rotors as they lag behind the demand
-  double demanded_thrust_n_ = 0;  ///< sum of the rotors' targets
+  Vec4 demanded_thrust_n_ = Vec4::Zero();  ///< static, of each rotor
+  Vec4 rotor_radps_ = Vec4::Zero();        ///< believed speeds, which lag behind the demand
+  double rotor_thrust_n_ = 0;              ///< collective, in the present axial flow
   MotorCommand motors_;
 };
 

@@ -56,9 +56,11 @@ struct MotorBelief {
   double torque_constant = 0.01085;  ///< Kt, N m/A and V/(rad/s)
   double resistance_ohm = 0.085;
   double no_load_current_a = 0.5;
-  double time_constant_s = 0.028;   ///< at hover
-  double idle_speed_radps = 150;    ///< the rotors never turn slower while armed
-  double nominal_voltage_v = 14.8;  ///< until the battery has been read
+  double time_constant_s = 0.028;        ///< at hover
+  double zero_thrust_pitch_m = 0.02256;  ///< axial air speed per rotor speed at which the thrust is
+                                         ///< gone: 0.62 diameters a turn
+  double idle_speed_radps = 150;         ///< the rotors never turn slower while armed
+  double nominal_voltage_v = 14.8;       ///< until the battery has been read
   double voltage_filter_s = 0.05;
 
   void fields(auto& f) {
@@ -66,11 +68,13 @@ struct MotorBelief {
     f("resistance_ohm", resistance_ohm, "winding resistance");
     f("no_load_current_a", no_load_current_a, "no-load current");
     f("time_constant_s", time_constant_s, "rotor speed lag at hover");
+    f("zero_thrust_pitch_m", zero_thrust_pitch_m, "axial air speed per rotor speed, thrust gone");
     f("idle_speed_radps", idle_speed_radps, "slowest rotor speed while armed");
     f("nominal_voltage_v", nominal_voltage_v, "battery voltage until it has been read");
     f("voltage_filter_s", voltage_filter_s, "time constant of the battery voltage filter");
     f.check(torque_constant > 0, "torque_constant > 0");
     f.check(resistance_ohm > 0, "resistance_ohm > 0");
+    f.check(zero_thrust_pitch_m > 0, "zero_thrust_pitch_m > 0");
     f.check(idle_speed_radps > 0, "idle_speed_radps > 0");
     f.check(voltage_filter_s > 0, "voltage_filter_s > 0");
   }

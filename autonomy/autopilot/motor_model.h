@@ -17,6 +17,12 @@ class MotorModel {
   /// Throttle 0..1 that holds `thrust_n` at `voltage_v`.
   [[nodiscard]] double throttle(double thrust_n, double voltage_v) const;
 
+  /// Rotor speed, rad/s, of a static thrust.
+  [[nodiscard]] double speed(double thrust_n) const;
+
+  /// Thrust (N) of a rotor that moves along its axis through the air.
+  [[nodiscard]] double thrust(double speed_radps, double axial_mps) const;
+
   /// Thrust (N) at full throttle.
   [[nodiscard]] double full_thrust(double voltage_v) const;
 

@@ -16,13 +16,13 @@ constexpr std::array<double, 4> kTurningSense{1, 1, -1, -1};
 VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed)
     : config_(config), stream_(seed, "imu.vibration") {
   for (double& phase : phase_rad_) phase = stream_.uniform(0, 2 * std::numbers::pi);
-  // q'' + 2 z w q' + w^2 q = -alpha, alpha constant over the tick.
+  // q'' + 2 z w q' + w^2 q = alpha, alpha constant over the tick.
   const double w = 2 * std::numbers::pi * config.frame_mode_hz, z = config.frame_mode_damping;
   const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kTick_s);
   const double c = std::cos(wd * kTick_s), s = std::sin(wd * kTick_s);
   transition_ << decay * (c + z * w / wd * s), decay * s / wd, -decay * w * w / wd * s,
       decay * (c - z * w / wd * s);
-  const Eigen::Vector2d rest(-1 / (w * w), 0);  // where a constant unit alpha ends
+  const Eigen::Vector2d rest(1 / (w * w), 0);  // where a constant unit alpha ends
   input_ = rest - transition_ * rest;
 }
 

@@ -16,9 +16,9 @@ struct VibrationConfig {
   double broadband_mps2 = 0.3;         ///< [E] RMS of each axis, white up to 500 Hz
   double gyro_radps = 0.03;            ///< [E] peak, once per revolution about x and y
   double reference_speed_radps = 716;  ///< rotor speed of those amplitudes: hover
-  double frame_mode_hz = 80;           ///< [E] mount's rocking mode
+  double frame_mode_hz = 80;           ///< [E] plate with arms and IMU against the load
   double frame_mode_damping = 0.03;    ///< [E]
-  double frame_coupling = 0;           ///< 0 stiff frame, 1 the IMU's mount rocks on that mode
+  double frame_coupling = 0;           ///< 0 stiff frame, else inertia of load over plate
 
   void fields(auto& f) {
     f("once_per_rev_mps2", once_per_rev_mps2, "peak at hover, once per revolution, x and y [E]");
@@ -26,9 +26,9 @@ struct VibrationConfig {
     f("broadband_mps2", broadband_mps2, "RMS of each axis at hover [E]");
     f("gyro_radps", gyro_radps, "peak at hover, once per revolution, about x and y [E]");
     f("reference_speed_radps", reference_speed_radps, "rotor speed of those amplitudes: hover");
-    f("frame_mode_hz", frame_mode_hz, "rocking mode of the IMU's mount [E]");
+    f("frame_mode_hz", frame_mode_hz, "mode of the plate with arms and IMU against the load [E]");
     f("frame_mode_damping", frame_mode_damping, "its damping ratio [E]");
-    f("frame_coupling", frame_coupling, "0 stiff frame, 1 the mount rocks freely on that mode");
+    f("frame_coupling", frame_coupling, "0 stiff frame, else inertia of load over plate");
     f.check(once_per_rev_mps2 >= 0, "once_per_rev_mps2 >= 0");
     f.check(blade_pass_mps2 >= 0, "blade_pass_mps2 >= 0");
     f.check(broadband_mps2 >= 0, "broadband_mps2 >= 0");
@@ -40,6 +40,11 @@ struct VibrationConfig {
   }
 };
 
+/// A weak frame is two inertias on a spring: the plate that carries arms and IMU, which the rotors
+/// turn (J1), and the load (J2). A torque that gives the whole the angular acceleration alpha turns
+/// the plate, beside the rigid motion, by (J2/J1) q with q'' + 2 z w q' + w^2 q = alpha. The
+/// rotors' torques are in alpha, so the rate loop excites the mode that it hears.
+///
 /// The four rotors turn at slightly different speeds, so their lines beat. Each contributes half of
 /// the configured amplitude: four incoherent halves have the RMS of one whole.
 class VibrationModel {
@@ -52,7 +57,8 @@ class VibrationModel {
   VibrationModel(const VibrationConfig& config, std::uint64_t seed);
 
   /// The next tick's vibration, in B.
-  /// @param alpha_B true angular acceleration of the airframe, rad/s^2, which drives the mount.
+  /// @param alpha_B true angular acceleration of the airframe, rad/s^2, which drives the frame's
+  /// mode.
   Shake step(const std::array<double, 4>& rotor_radps, const Vec3& alpha_B);
 
  private:
@@ -61,7 +67,7 @@ class VibrationModel {
   VibrationConfig config_;
   RandomStream stream_;
   std::array<double, 4> phase_rad_{};
-  // Angle and rate of the mount relative to the airframe, about each axis, and their exact
+  // Angle and rate q of the frame's mode, about each axis, and their exact
   // propagation over one tick under a constant angular acceleration.
   Vec3 mount_angle_ = Vec3::Zero();
   Vec3 mount_rate_ = Vec3::Zero();

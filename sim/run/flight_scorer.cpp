@@ -1,0 +1,83 @@
+#include "run/flight_scorer.h"
+
+#include <cmath>
+
+namespace arex::sim {
+namespace {
+
+constexpr Stamp kRowPeriod = 50 * kNanosecondsPerTick;  // 20 Hz: flight.csv, clearance
+
+}  // namespace
+
+FlightScorer::FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start)
+    : clearance_(scene, airframe), X_WO_(X_WB_start) {}
+
+void FlightScorer::moved(const Truth& before, const Truth& after) {
+  distance_m_ += (after.X_WB.p - before.X_WB.p).norm();
+}
+
+void FlightScorer::sample(const Truth& truth, const Stack& stack, bool flying,
+                          const BatteryState& battery, Recorder* recorder) {
+  const Odometry& odometry = stack.odometry();
+  if (odometry.status == OdometryStatus::kLost) odometry_lost_s_ += to_seconds(kPeriod);
+  if (odometry.status != OdometryStatus::kInitialising && odometry.stamp == truth.stamp) {
+    // The stack's O is where its odometry began; truth is compared in that frame from then on.
+    if (poses_.empty()) X_WO_ = truth.X_WB * odometry.X_OB.inverse();
+    poses_.push_back({truth.stamp, truth.X_WB, odometry.X_OB});
+    if (recorder) recorder->estimate(truth.stamp, odometry.X_OB);
+  }
+  if (poses_.empty()) return;
+  const Pose X_OB = X_WO_.inverse() * truth.X_WB;
+  if (recorder) recorder->truth(truth.stamp, X_OB);
+
+  const MissionState state = stack.mission().state();
+  const double tracking_error = flying ? (X_OB.p - stack.setpoint().p_OB).norm() : 0.0;
+  if (flying && state != MissionState::kLand) {
+    tracking_sum_ += tracking_error * tracking_error;
+    ++tracking_count_;
+  }
+  if (truth.stamp % kRowPeriod != 0) return;
+  if (state == MissionState::kFly) last_clearance_m_ = clearance_.measure(truth);
+  if (recorder) write_row(truth, X_OB, tracking_error, battery, *recorder);
+}
+
+void FlightScorer::write_row(const Truth& truth, const Pose& X_OB, double tracking_error,
+                             const BatteryState& battery, Recorder& recorder) const {
+  FlightRow row;
+  row.stamp = truth.stamp;
+  row.speed_mps = truth.v_WB.norm();
+  row.tracking_error_m = tracking_error;
+  row.odometry_error_m = (poses_.back().X_OB.p - X_OB.p).norm();
+  row.odometry_yaw_error_rad = so3::wrap(so3::yaw(poses_.back().X_OB.R) - so3::yaw(X_OB.R));
+  row.clearance_m = last_clearance_m_;
+  row.height_m = X_OB.p.z();
+  row.battery_voltage_v = battery.voltage_v;
+  row.battery_power_w = battery.voltage_v * battery.current_a;
+  row.battery_fraction = battery.state_of_charge;
+  recorder.flight(row);
+}
+
+void FlightScorer::target_reached(const Truth& truth, const Stack& stack) {
+  const Vec3 target_W = X_WO_ * stack.mission().targets().back().p_O;
+  target_miss_m_.push_back((truth.X_WB.p - target_W).norm());
+}
+
+FlightScore FlightScorer::score(const Truth& truth, const Stack& stack) const {
+  FlightScore score;
+  score.distance_m = distance_m_;
+  if (tracking_count_ > 0) {
+    score.tracking_rmse_m = std::sqrt(tracking_sum_ / static_cast<double>(tracking_count_));
+  }
+  if (!stack.mission().targets().empty()) {
+    const Vec3 target_W = X_WO_ * stack.mission().targets().back().p_O;
+    score.landing_error_m = (truth.X_WB.p - target_W).head<2>().norm();
+  }
+  score.target_miss_m = target_miss_m_;
+  score.poses = poses_;
+  score.odometry = score_odometry(poses_);
+  score.odometry_lost_s = odometry_lost_s_;
+  score.clearance = clearance_.statistics();
+  return score;
+}
+
+}  // namespace arex::sim

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <vector>
+
+#include "physics/physics.h"
+#include "run/recorder.h"
+#include "scoring/clearance.h"
+#include "scoring/odometry_error.h"
+#include "stack/stack.h"
+
+namespace arex::sim {
+
+/// What a flight amounts to beside its outcome; most of summary.json.
+struct FlightScore {
+  double distance_m = 0;
+  double tracking_rmse_m = 0;         ///< true position against the setpoint, take-off to landing
+  double landing_error_m = 0;         ///< horizontal, true resting place against the last target
+  std::vector<double> target_miss_m;  ///< true distance from each target when it was reported
+  std::vector<PosePair> poses;        ///< truth and estimate at 200 Hz
+  OdometryScore odometry;
+  double odometry_lost_s = 0;
+  ClearanceMeter::Statistics clearance;
+};
+
+/// Follows a flight with the truth in hand: the place in sim/run where truth meets estimate.
+class FlightScorer {
+ public:
+  FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start);
+
+  static constexpr Stamp kPeriod = 5 * kNanosecondsPerTick;  ///< 200 Hz
+
+  /// After each physics tick.
+  void moved(const Truth& before, const Truth& after);
+  /// Every kPeriod; `recorder` may be null.
+  void sample(const Truth& truth, const Stack& stack, bool flying, const BatteryState& battery,
+              Recorder* recorder);
+  /// When the mission says that it reached its newest target.
+  void target_reached(const Truth& truth, const Stack& stack);
+
+  /// O in W: where the stack's odometry began; until then where it should begin.
+  [[nodiscard]] const Pose& X_WO() const { return X_WO_; }
+  [[nodiscard]] FlightScore score(const Truth& truth, const Stack& stack) const;
+
+ private:
+  void write_row(const Truth& truth, const Pose& X_OB, double tracking_error,
+                 const BatteryState& battery, Recorder& recorder) const;
+
+  ClearanceMeter clearance_;
+  double last_clearance_m_ = 0;
+  Pose X_WO_;
+  std::vector<PosePair> poses_;
+  double odometry_lost_s_ = 0;
+  double distance_m_ = 0;
+  double tracking_sum_ = 0;
+  std::size_t tracking_count_ = 0;
+  std::vector<double> target_miss_m_;
+};
+
+}  // namespace arex::sim

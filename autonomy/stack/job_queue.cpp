@@ -32,6 +32,18 @@ void JobQueue::stop() {
   workers_.clear();
 }
 
+void JobQueue::drain() {
+  std::unique_lock lock(mutex_);
+  while (!pending_.empty()) {
+    const JobPtr job = pending_.front();
+    while (!job->done) {
+      if (!run_one(lock, job->lane)) job_done_.wait(lock);
+    }
+    pending_.erase(pending_.begin());
+    if (job->error) std::rethrow_exception(job->error);
+  }
+}
+
 JobQueue::Lane JobQueue::add_lane(std::string name) {
   const std::lock_guard lock(mutex_);
   lanes_.emplace_back().name = std::move(name);

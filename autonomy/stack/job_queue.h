@@ -38,6 +38,9 @@ class JobQueue {
   /// touch goes away.
   void stop();
 
+  /// Runs every job that was begun or waits, and drops the results: the end of a flight.
+  void drain();
+
   Lane add_lane(std::string name);
 
   /// Starts `work` at `now` or when the lane is free. @return the stamp at which it becomes

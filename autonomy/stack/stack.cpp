@@ -1,5 +1,7 @@
 #include "stack/stack.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace arex {
@@ -8,6 +10,8 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs)
       jobs_(jobs),
       lidar_inertial_(config.odometry.lidar_inertial, config.vehicle),
       odometry_lane_(jobs.add_lane("odometry")),
+      cloud_(config.mapping.cloud),
+      cloud_lane_(jobs.add_lane("cloud")),
       mission_(config.mission,
                [this](EventKind kind, const std::string& detail) {
                  events_.push_back({now_, kind, detail});
@@ -43,7 +47,22 @@ void Stack::add_scan(const LidarScanPtr& scan) {
                 return [this, update = lidar_inertial_.correct(job)] {
                   lidar_inertial_.apply(update);
                   set_odometry(lidar_inertial_.odometry());
+                  map(update);
                 };
+              });
+}
+
+void Stack::map(const ScanUpdate& update) {
+  if (!update.points_O || update.points_O->empty()) return;
+  jobs_.start(cloud_lane_, now_, 0,
+              [this, points = update.points_O, p_OB = update.state.p_OB.cast<float>().eval(),
+               range = static_cast<float>(config_.mapping.cloud_range_m)]() -> JobQueue::Delivery {
+                std::vector<Vec3f> near;
+                near.reserve(points->size());
+                std::copy_if(points->begin(), points->end(), std::back_inserter(near),
+                             [&](const Vec3f& p) { return (p - p_OB).norm() <= range; });
+                cloud_.insert(near);
+                return nullptr;
               });
 }
 

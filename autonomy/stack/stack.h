@@ -7,6 +7,7 @@
 
 #include "control/tracker.h"
 #include "exploration/mission.h"
+#include "mapping/point_cloud_map.h"
 #include "messages/commands.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
@@ -39,10 +40,15 @@ struct OdometryConfig {
 struct MappingConfig {
   bool use_depth = true;
   double depth_rate_hz = 10;
+  double cloud_range_m = 20;  ///< angle noise of 0.1 deg spreads what lies further over a voxel
+  PointCloudMapConfig cloud;
 
   void fields(auto& f) {
     f("use_depth", use_depth, "read the depth camera");
     f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
+    f("cloud_range_m", cloud_range_m, "points further from the vehicle wait until it is nearer");
+    f("cloud", cloud, "global point cloud");
+    f.check(cloud_range_m > 0, "cloud_range_m > 0");
     f.check(depth_rate_hz > 0 && depth_rate_hz <= 30, "0 < depth_rate_hz <= 30");
   }
 };
@@ -96,11 +102,16 @@ class Stack {
   [[nodiscard]] const Odometry& odometry() const { return odometry_; }
   [[nodiscard]] const TrajectorySetpoint& setpoint() const { return setpoint_; }
   [[nodiscard]] const Mission& mission() const { return mission_; }
+  /// The global point cloud, in O. It belongs to its lane: read it in a job of that lane, or when
+  /// the jobs are drained.
+  [[nodiscard]] const PointCloudMap& cloud() const { return cloud_; }
+  [[nodiscard]] JobQueue::Lane cloud_lane() const { return cloud_lane_; }
   /// What happened since the last call.
   std::vector<Event> take_events();
 
  private:
   void set_odometry(const Odometry& odometry);
+  void map(const ScanUpdate& update);
   AttitudeCommand control(const MotionRequest& request);
 
   StackConfig config_;
@@ -110,6 +121,8 @@ class Stack {
 
   LidarInertialOdometry lidar_inertial_;
   JobQueue::Lane odometry_lane_;
+  PointCloudMap cloud_;
+  JobQueue::Lane cloud_lane_;
   Odometry odometry_;
   AutopilotStatus autopilot_;
   Mission mission_;

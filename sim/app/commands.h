@@ -19,6 +19,7 @@ struct ScenarioArguments {
 struct RunArguments {
   ScenarioArguments scenario;
   std::string out;  ///< empty: runs/<scenario>-seed<seed>
+  std::string bag;  ///< ROS 1 bag to write; empty: none
   int threads = 1;
   bool quiet = false;
 };

@@ -21,6 +21,7 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("run", "fly a scenario, write a scored run folder");
   add_scenario_options(*command, arguments.scenario, true);
   command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
+  command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
   command->add_option("--threads", arguments.threads, "host threads; the result does not change")
       ->check(CLI::Range(1, 64));
   command->add_flag("--quiet", arguments.quiet, "no progress line");

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "app/commands.h"
 #include "run/recorder.h"
@@ -67,8 +68,8 @@ std::filesystem::path run_folder(const RunArguments& arguments, const sim::Scena
 void print_result(const sim::FlightResult& result, const std::filesystem::path& folder) {
   const auto outcome = sim::kOutcomeNames[static_cast<std::size_t>(result.outcome)];
   std::printf("%.*s (%s) after %.1f s and %.1f m, hash %s: %s\n", static_cast<int>(outcome.size()),
-              outcome.data(), result.reason.c_str(), to_seconds(result.duration), result.distance_m,
-              result.trajectory_hash.c_str(), folder.c_str());
+              outcome.data(), result.reason.c_str(), to_seconds(result.duration),
+              result.flight.distance_m, result.trajectory_hash.c_str(), folder.c_str());
 }
 
 int exit_code_of(sim::Outcome outcome) {
@@ -90,6 +91,11 @@ int run(const RunArguments& arguments) {
   sim::Recorder recorder(folder, scenario.resolved_yaml());
   simulation.record_to(recorder);
 
+  std::optional<sim::BagWriter> bag;
+  if (!arguments.bag.empty()) {
+    simulation.record_to(bag.emplace(arguments.bag, scenario.config.stack.vehicle));
+  }
+
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   {
@@ -100,6 +106,8 @@ int run(const RunArguments& arguments) {
     }
   }
   const sim::FlightResult result = simulation.finish();
+  if (bag) bag->close();
+  recorder.write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
   recorder.write_file("timing.csv", sim::timing_csv(result.timing));
   recorder.write_summary(
       sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}));

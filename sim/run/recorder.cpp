@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/cloud_io.h"
+
 namespace arex::sim {
 namespace {
 
@@ -52,7 +54,8 @@ Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_
   estimate_ = open("estimate.tum", "# time_s x_m y_m z_m qx qy qz qw (estimated X_OB)\n");
   events_ = open("events.csv", "time_s,kind,detail\n");
   flight_ = open("flight.csv",
-                 "time_s,speed_mps,tracking_error_m,odometry_error_m,clearance_m,height_m,"
+                 "time_s,speed_mps,tracking_error_m,odometry_error_m,odometry_yaw_error_rad,"
+                 "clearance_m,height_m,"
                  "battery_voltage_v,battery_power_w,battery_fraction\n");
   flush();
 }
@@ -77,10 +80,10 @@ void Recorder::event(const Event& event) {
 }
 
 void Recorder::flight(const FlightRow& row) {
-  std::fprintf(flight_.get(), "%.3f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.1f,%.5f\n",
+  std::fprintf(flight_.get(), "%.3f,%.4f,%.4f,%.4f,%.5f,%.4f,%.4f,%.3f,%.1f,%.5f\n",
                to_seconds(row.stamp), row.speed_mps, row.tracking_error_m, row.odometry_error_m,
-               row.clearance_m, row.height_m, row.battery_voltage_v, row.battery_power_w,
-               row.battery_fraction);
+               row.odometry_yaw_error_rad, row.clearance_m, row.height_m, row.battery_voltage_v,
+               row.battery_power_w, row.battery_fraction);
 }
 
 void Recorder::flush() {
@@ -92,6 +95,10 @@ void Recorder::flush() {
 
 void Recorder::check(std::FILE* file, const char* name) {
   if (std::fflush(file) != 0 || std::ferror(file) != 0) fail(directory_ / name);
+}
+
+void Recorder::write_cloud(const std::vector<Vec3f>& points_O) const {
+  if (!write_pcd(directory_ / "cloud.pcd", points_O)) fail(directory_ / "cloud.pcd");
 }
 
 void Recorder::write_file(const std::string& name, const std::string& content) {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "math/pose.h"
 #include "messages/events.h"
@@ -17,8 +18,9 @@ struct FlightRow {
   double speed_mps = 0;         ///< true
   double tracking_error_m = 0;  ///< true position against the setpoint
   double odometry_error_m = 0;  ///< estimate against truth, aligned at the start
-  double clearance_m = 0;       ///< airframe to the nearest surface
-  double height_m = 0;          ///< true z in O
+  double odometry_yaw_error_rad = 0;
+  double clearance_m = 0;  ///< airframe to the nearest surface
+  double height_m = 0;     ///< true z in O
   double battery_voltage_v = 0;
   double battery_power_w = 0;
   double battery_fraction = 1;  ///< state of charge
@@ -40,6 +42,8 @@ class Recorder {
   /// Makes what was recorded so far readable by others.
   void flush();
 
+  /// cloud.pcd, replaced atomically. May be called from a job.
+  void write_cloud(const std::vector<Vec3f>& points_O) const;
   /// A whole file of the folder, replaced atomically.
   void write_file(const std::string& name, const std::string& content);
   /// Flushes everything, then writes summary.json.

@@ -9,10 +9,10 @@ namespace arex::sim {
 namespace {
 
 constexpr Stamp kTick = kNanosecondsPerTick;
-constexpr Stamp kEstimatePeriod = 5 * kTick;  // 200 Hz: IMU to the stack, TUM files
-constexpr Stamp kFlightPeriod = 50 * kTick;   // 20 Hz: flight.csv, clearance
-constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
-constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
+constexpr Stamp kStatusPeriod = 5 * kTick;  // 200 Hz: what the autopilot tells, the battery, mocap
+constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leaves it
+constexpr Stamp kFlushPeriod = 1000 * kTick;    // what a killed run leaves
+constexpr Stamp kLidarPart = 20 * kTick;        // a frame is cast in parts while it is fired
 
 std::vector<worlds::CollisionShape> airframe_without_lidar(const Airframe& airframe) {
   std::vector<worlds::CollisionShape> shapes;
@@ -45,13 +45,12 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       world_(scenario.build_world()),
       scene_(world_),
       physics_(config_.physics, world_, start_pose(world_, config_.stack.vehicle), config_.seed),
-      X_OW_(physics_.truth().X_WB.inverse()),
       imu_(config_.imu, config_.seed),
       lidar_(config_.lidar, scene_, physics_.airframe().X_BL,
              airframe_without_lidar(physics_.airframe()), config_.seed),
       autopilot_(config_.autopilot, config_.stack.vehicle),
       previous_truth_(physics_.truth()),
-      clearance_(scene_, physics_.airframe()),
+      scorer_(scene_, physics_.airframe(), physics_.truth().X_WB),
       jobs_(threads),
       lidar_lane_(jobs_.add_lane("lidar")),
       depth_lane_(jobs_.add_lane("depth")),
@@ -76,14 +75,18 @@ void Simulation::fire_imu() {
   const StageTimer::Scope timed(timers_.imu);
   const Truth& truth = physics_.truth();
   autopilot_.add_imu(imu_.sample(truth));
-  if (const auto sample = imu_.output()) stack_.add_imu(*sample);
+  if (const auto sample = imu_.output()) {
+    stack_.add_imu(*sample);
+    if (bag_) bag_->imu(*sample);
+  }
   if (const auto sample = imu_.magnetometer()) autopilot_.add_magnetometer(*sample);
   if (const auto sample = imu_.barometer()) autopilot_.add_barometer(*sample);
-  if (now_ % kEstimatePeriod == 0) {
+  if (now_ % kStatusPeriod == 0) {
     const BatteryState& battery = physics_.battery();
     autopilot_.add_battery({now_, battery.voltage_v, battery.current_a});
     if (config_.stack.odometry.source == OdometryConfig::Source::kMocap) {
-      stack_.add_mocap({now_, true_pose_in_O(), X_OW_.R * truth.v_WB});
+      const Pose X_OW = scorer_.X_WO().inverse();
+      stack_.add_mocap({now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB});
     }
   }
 }
@@ -116,6 +119,7 @@ void Simulation::fire_lidar() {
         return [this, frame, hash = hash_of(*frame)] {
           sensor_hash_.add(hash);
           stack_.add_scan(frame);
+          if (bag_) bag_->scan(*frame);
         };
       });
   lidar_part_.assign(1, physics_.truth());
@@ -139,6 +143,7 @@ void Simulation::fire_depth() {
                    return [this, frame, hash = hash_of(*frame)] {
                      sensor_hash_.add(hash);
                      stack_.add_depth(frame);
+                     if (bag_) bag_->depth(*frame);
                    };
                  });
 }
@@ -146,7 +151,7 @@ void Simulation::fire_depth() {
 void Simulation::run_stack() {
   jobs_.advance(now_);
   const StageTimer::Scope timed(timers_.stack);
-  if (now_ % kEstimatePeriod == 0) {
+  if (now_ % kStatusPeriod == 0) {
     stack_.add_autopilot({autopilot_.attitude(), autopilot_.state() == AutopilotState::kStandby,
                           autopilot_.armed(), autopilot_.state() > AutopilotState::kSpinUp,
                           autopilot_.landed()});
@@ -173,51 +178,33 @@ void Simulation::step_physics() {
   hash_.add({truth.X_WB.R.data(), 9});
   hash_.add({truth.X_WB.p.data(), 3});
   hash_.add({truth.v_WB.data(), 3});
-  distance_m_ += (truth.X_WB.p - previous_truth_.X_WB.p).norm();
+  scorer_.moved(previous_truth_, truth);
 }
 
 void Simulation::record() {
   const StageTimer::Scope timed(timers_.recording);
+  const Truth& truth = physics_.truth();
   for (const Event& event : stack_.take_events()) {
-    if (event.kind == EventKind::kTargetReached) {
-      const Vec3 target = stack_.mission().targets().back().p_O;
-      target_miss_m_.push_back((true_pose_in_O().p - target).norm());
-    }
+    if (event.kind == EventKind::kTargetReached) scorer_.target_reached(truth, stack_);
     if (recorder_) recorder_->event(event);
   }
-  if (now_ % kEstimatePeriod == 0) score_tick();
+  if (now_ % FlightScorer::kPeriod == 0) {
+    scorer_.sample(truth, stack_, !autopilot_.landed(), physics_.battery(), recorder_);
+    if (bag_) {
+      const Pose X_OW = scorer_.X_WO().inverse();
+      bag_->truth(now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB, truth.w_WB_B);
+    }
+  }
   if (recorder_ && now_ % kFlushPeriod == 0) recorder_->flush();
+  if (recorder_ && now_ > 0 && now_ % kCloudPeriod == 0) write_cloud();
 }
 
-void Simulation::score_tick() {
-  const Truth& truth = physics_.truth();
-  const Odometry& odometry = stack_.odometry();
-  const bool flying = !autopilot_.landed();
-  if (odometry.status == OdometryStatus::kLost) odometry_lost_s_ += to_seconds(kEstimatePeriod);
-  if (odometry.status != OdometryStatus::kInitialising && odometry.stamp == now_) {
-    // The stack's O is where its odometry began; truth is compared in that frame from then on.
-    if (pose_pairs_.empty()) X_OW_ = odometry.X_OB * truth.X_WB.inverse();
-    pose_pairs_.push_back({now_, truth.X_WB, odometry.X_OB});
-    if (recorder_) recorder_->estimate(now_, odometry.X_OB);
-  }
-  if (pose_pairs_.empty()) return;
-  const Pose X_OB_true = true_pose_in_O();
-  const double odometry_error = (pose_pairs_.back().X_OB.p - X_OB_true.p).norm();
-  const double tracking_error = flying ? (X_OB_true.p - stack_.setpoint().p_OB).norm() : 0.0;
-  if (flying && stack_.mission().state() != MissionState::kLand) {
-    tracking_sum_ += tracking_error * tracking_error;
-    ++tracking_count_;
-  }
-  if (recorder_) recorder_->truth(now_, X_OB_true);
-  if (now_ % kFlightPeriod != 0) return;
-  if (stack_.mission().state() == MissionState::kFly) {
-    last_clearance_m_ = clearance_.measure(truth);
-  }
-  if (!recorder_) return;
-  const BatteryState& battery = physics_.battery();
-  recorder_->flight({now_, truth.v_WB.norm(), tracking_error, odometry_error, last_clearance_m_,
-                     X_OB_true.p.z(), battery.voltage_v, battery.voltage_v * battery.current_a,
-                     battery.state_of_charge});
+void Simulation::write_cloud() {
+  // Behind the insertions of the same lane, so that the file is the map of this moment.
+  jobs_.start(stack_.cloud_lane(), now_, 0, [this]() -> JobQueue::Delivery {
+    recorder_->write_cloud(stack_.cloud().points());
+    return nullptr;
+  });
 }
 
 void Simulation::judge() {
@@ -253,26 +240,23 @@ void Simulation::end(Outcome outcome, const std::string& reason) {
 }
 
 FlightResult Simulation::finish() {
+  jobs_.drain();
   FlightResult result;
   result.outcome = outcome_;
   result.reason = reason_;
   result.duration = now_;
   result.trajectory_hash = hash_.text();
   result.sensor_hash = sensor_hash_.text();
-  result.distance_m = distance_m_;
-  if (tracking_count_ > 0) {
-    result.tracking_rmse_m = std::sqrt(tracking_sum_ / static_cast<double>(tracking_count_));
-  }
   result.collisions = collisions_;
   result.targets = stack_.mission().targets();
-  result.target_miss_m = target_miss_m_;
-  if (!result.targets.empty()) {
-    const Vec3 miss = true_pose_in_O().p - result.targets.back().p_O;
-    result.landing_error_m = miss.head<2>().norm();
+  result.flight = scorer_.score(physics_.truth(), stack_);
+  const std::vector<Vec3f> cloud = stack_.cloud().points();
+  if (!cloud.empty()) {
+    if (recorder_) recorder_->write_cloud(cloud);
+    // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
+    // odometry's.
+    result.map = score_map(cloud, align_rigid(result.flight.poses), world_, scene_);
   }
-  result.odometry = score_odometry(pose_pairs_);
-  result.odometry_lost_s = odometry_lost_s_;
-  result.clearance = clearance_.statistics();
   result.battery = physics_.battery();
   if (camera_) result.renderer = camera_->renderer_name();
   for (const StageTimer* timer :

@@ -1,17 +1,19 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "autopilot/autopilot.h"
 #include "physics/physics.h"
+#include "run/bag_writer.h"
+#include "run/flight_scorer.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
 #include "run/stage_timer.h"
 #include "run/trajectory_hash.h"
-#include "scoring/clearance.h"
-#include "scoring/odometry_error.h"
+#include "scoring/map_error.h"
 #include "sensors/scene.h"
 #include "stack/job_queue.h"
 
@@ -29,15 +31,10 @@ struct FlightResult {
   Stamp duration = 0;
   std::string trajectory_hash;  ///< of the true state at every tick and every command
   std::string sensor_hash;      ///< of every scan and frame delivered
-  double distance_m = 0;
-  double tracking_rmse_m = 0;  ///< true position against the setpoint, take-off to landing
-  double landing_error_m = 0;  ///< horizontal, true resting place against the last target
   int collisions = 0;
   std::vector<MissionTarget> targets;
-  std::vector<double> target_miss_m;  ///< true distance from each target when it was reported
-  OdometryScore odometry;
-  double odometry_lost_s = 0;
-  ClearanceMeter::Statistics clearance;
+  FlightScore flight;
+  std::optional<MapScore> map;  ///< nothing without a map
   BatteryState battery;
   std::string renderer;  ///< of the depth frames; empty if none was read
   std::vector<TimingRow> timing;
@@ -54,6 +51,9 @@ class Simulation {
 
   /// Writes what happens from now on; `recorder` must outlive the flight.
   void record_to(Recorder& recorder) { recorder_ = &recorder; }
+
+  /// Gives what the sensors deliver to a bag as well; it must outlive the flight.
+  void record_to(BagWriter& bag) { bag_ = &bag; }
 
   /// Flies one millisecond. @return whether the flight goes on.
   bool tick();
@@ -74,10 +74,9 @@ class Simulation {
   void run_autopilot();
   void step_physics();
   void record();
-  void score_tick();
   void judge();
   void end(Outcome outcome, const std::string& reason);
-  [[nodiscard]] Pose true_pose_in_O() const { return X_OW_ * physics_.truth().X_WB; }
+  void write_cloud();
 
   struct Timers {
     StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
@@ -88,13 +87,12 @@ class Simulation {
   worlds::World world_;
   Scene scene_;
   Physics physics_;
-  Pose X_OW_;  ///< for scoring and the mocap oracle; the stack never sees it. O as the stack began
-               ///< it
   ImuModel imu_;
   Mid360 lidar_;
   std::unique_ptr<D430> camera_;  ///< made when the first frame is read
   Autopilot autopilot_;
   Recorder* recorder_ = nullptr;
+  BagWriter* bag_ = nullptr;
 
   Stamp now_ = 0;
   Outcome outcome_ = Outcome::kFlying;
@@ -107,15 +105,8 @@ class Simulation {
 
   TrajectoryHash hash_;
   TrajectoryHash sensor_hash_;
-  ClearanceMeter clearance_;
-  double last_clearance_m_ = 0;
-  std::vector<PosePair> pose_pairs_;
-  double odometry_lost_s_ = 0;
-  double distance_m_ = 0;
-  double tracking_sum_ = 0;
-  std::size_t tracking_count_ = 0;
+  FlightScorer scorer_;
   int collisions_ = 0;
-  std::vector<double> target_miss_m_;
   Timers timers_;
 
   JobQueue jobs_;

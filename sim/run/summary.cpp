@@ -24,14 +24,14 @@ ordered_json targets_json(const FlightResult& result) {
                        {"y", rounded(target.p_O.y())},
                        {"z", rounded(target.p_O.z())},
                        {"time_s", to_seconds(target.reached)},
-                       {"miss_m", rounded(result.target_miss_m[i])}});
+                       {"miss_m", rounded(result.flight.target_miss_m[i])}});
   }
   return targets;
 }
 
 ordered_json odometry_json(const Scenario& scenario, const FlightResult& result) {
   const auto source = scenario.config.stack.odometry.source;
-  const OdometryScore& score = result.odometry;
+  const OdometryScore& score = result.flight.odometry;
   return {{"source", enum_names(source)[static_cast<std::size_t>(source)]},
           {"ate_rmse_m", rounded(score.ate_rmse_m)},
           {"ate_max_m", rounded(score.ate_max_m)},
@@ -40,7 +40,14 @@ ordered_json odometry_json(const Scenario& scenario, const FlightResult& result)
           {"start_tilt_deg", rounded(score.start_tilt_deg)},
           {"rpe_1m_m", rounded(score.rpe_1m_m)},
           {"rpe_10m_m", rounded(score.rpe_10m_m)},
-          {"lost_s", rounded(result.odometry_lost_s)}};
+          {"lost_s", rounded(result.flight.odometry_lost_s)}};
+}
+
+ordered_json map_json(const std::optional<MapScore>& score) {
+  if (!score) return nullptr;
+  return {{"points", score->points},        {"median_m", rounded(score->median_m)},
+          {"p95_m", rounded(score->p95_m)}, {"outlier_fraction", rounded(score->outlier_fraction)},
+          {"scored", score->scored},        {"foliage", score->foliage}};
 }
 
 }  // namespace
@@ -58,16 +65,16 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   json["real_time_factor"] = rounded(sim_time / std::max(host.wall_s, 1e-9));
   json["trajectory_hash"] = result.trajectory_hash;
   json["sensor_hash"] = result.sensor_hash;
-  json["distance_m"] = rounded(result.distance_m);
+  json["distance_m"] = rounded(result.flight.distance_m);
   json["targets"] = targets_json(result);
   json["coverage"] = nullptr;
-  json["map"] = nullptr;
+  json["map"] = map_json(result.map);
   json["odometry"] = odometry_json(scenario, result);
   json["planner"] = nullptr;
-  json["tracking"] = {{"rmse_m", rounded(result.tracking_rmse_m)},
-                      {"landing_error_m", rounded(result.landing_error_m)}};
-  json["clearance"] = {{"min_m", rounded(result.clearance.min_m)},
-                       {"p05_m", rounded(result.clearance.p05_m)}};
+  json["tracking"] = {{"rmse_m", rounded(result.flight.tracking_rmse_m)},
+                      {"landing_error_m", rounded(result.flight.landing_error_m)}};
+  json["clearance"] = {{"min_m", rounded(result.flight.clearance.min_m)},
+                       {"p05_m", rounded(result.flight.clearance.p05_m)}};
   json["collisions"] = result.collisions;
   json["battery"] = {{"used_wh", rounded(result.battery.used_wh)},
                      {"remaining_fraction", rounded(result.battery.state_of_charge)}};
@@ -75,6 +82,23 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
       result.renderer.empty() ? ordered_json(nullptr) : ordered_json(result.renderer);
   json["build"] = {{"version", AREX_VERSION}, {"compiler", "g++ " __VERSION__}};
   return json;
+}
+
+std::string odometry_error_csv(const std::vector<PosePair>& poses) {
+  // At 20 Hz; aligned at the first pose.
+  constexpr std::size_t kStride = 10;
+  const Pose X_WO = align_at_start(poses);
+  std::string text = "time_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad\n";
+  for (std::size_t i = 0; i < poses.size(); i += kStride) {
+    const Pose aligned = X_WO * poses[i].X_OB;
+    const Vec3 p = aligned.p - poses[i].X_WB.p;
+    const Vec3 r = so3::Log(aligned.R * poses[i].X_WB.R.transpose());
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%.3f,%.5f,%.5f,%.5f,%.6f,%.6f,%.6f\n",
+                  to_seconds(poses[i].stamp), p.x(), p.y(), p.z(), r.x(), r.y(), r.z());
+    text += line.data();
+  }
+  return text;
 }
 
 std::string timing_csv(const std::vector<TimingRow>& rows) {

@@ -18,6 +18,10 @@ struct HostTime {
 nlohmann::ordered_json summarise(const Scenario& scenario, const FlightResult& result,
                                  const HostTime& host);
 
+/// odometry_error.csv: estimate minus truth, aligned at the first pose; position in W, m, and
+/// rotation vector in W, rad.
+std::string odometry_error_csv(const std::vector<PosePair>& poses);
+
 /// timing.csv: module,calls,median_ms,p99_ms,total_s.
 std::string timing_csv(const std::vector<TimingRow>& rows);
 

@@ -16,7 +16,7 @@ FlightResult fly(std::uint64_t seed, int threads) {
 
 TEST(Determinism, ARunIsTheSameForAnyNumberOfThreadsAndOtherForAnotherSeed) {
   const FlightResult reference = fly(1, 1);
-  EXPECT_GT(reference.distance_m, 1.5);  // it flies, LiDAR and depth running
+  EXPECT_GT(reference.flight.distance_m, 1.5);  // it flies, LiDAR and depth running
   for (const int threads : {1, 2, 4}) {
     const FlightResult again = fly(1, threads);
     EXPECT_EQ(again.trajectory_hash, reference.trajectory_hash) << threads << " threads";

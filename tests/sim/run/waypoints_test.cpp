@@ -18,9 +18,9 @@ void expect_good_flight(const FlightResult& result, std::uint64_t seed) {
   EXPECT_EQ(result.outcome, Outcome::kSucceeded) << "seed " << seed << ": " << result.reason;
   EXPECT_EQ(result.collisions, 0) << "seed " << seed;
   ASSERT_EQ(result.targets.size(), 6u) << "seed " << seed;
-  for (const double miss : result.target_miss_m) EXPECT_LT(miss, 0.2) << "seed " << seed;
-  EXPECT_LT(result.tracking_rmse_m, 0.10) << "seed " << seed;
-  EXPECT_LT(result.landing_error_m, 0.3) << "seed " << seed;
+  for (const double miss : result.flight.target_miss_m) EXPECT_LT(miss, 0.2) << "seed " << seed;
+  EXPECT_LT(result.flight.tracking_rmse_m, 0.10) << "seed " << seed;
+  EXPECT_LT(result.flight.landing_error_m, 0.3) << "seed " << seed;
 }
 
 // What the sensors see does not matter on the oracle's pose: only the flight itself is flown here.

@@ -78,6 +78,7 @@ void HeightBand::spread_ground() {
   // Lower envelope of cones, one on each tile's lowest point: two sweeps over the tiles.
   const int nx = brick_count_.x();
   const int ny = brick_count_.y();
+  const double diagonal = slope_ * std::sqrt(2.0);
   std::vector<double> height(tiles_.size());
   std::transform(tiles_.begin(), tiles_.end(), height.begin(),
                  [](const Tile& tile) { return static_cast<double>(tile.lowest); });
@@ -85,7 +86,7 @@ void HeightBand::spread_ground() {
     const int u = x + dx;
     const int v = y + dy;
     if (u < 0 || v < 0 || u >= nx || v >= ny) return;
-    const double rise = slope_ * std::hypot(dx, dy);
+    const double rise = dx != 0 && dy != 0 ? diagonal : slope_;
     double& here = height[static_cast<std::size_t>(y * nx + x)];
     here = std::min(here, height[static_cast<std::size_t>(v * nx + u)] + rise);
   };

@@ -49,6 +49,11 @@ class StateTree::Tree : public octomap::OcTree {
   void refresh(Node* node) {
     if (!pruneNode(node)) node->updateOccupancyChildren();
   }
+  /// refresh() of a node whose voxels are at hand: no look at the children unless they merge.
+  void settle(Node* node, bool all_known, bool any_occupied, bool all_occupied) {
+    if (all_known && any_occupied == all_occupied && pruneNode(node)) return;
+    node->setLogOdds(value(any_occupied));
+  }
   [[nodiscard]] float value(bool occupied) const {
     return occupied ? clamping_thres_max : clamping_thres_min;
   }
@@ -87,6 +92,7 @@ class StateTree::Tree : public octomap::OcTree {
   /// A cube of 4^3 voxels: a node whose children are bytes.
   void apply_word(Node* node, bool is_new, std::uint64_t known, std::uint64_t occupied,
                   std::uint64_t changed) {
+    const bool all_known = ~known == 0, any_occupied = occupied != 0, all_occupied = ~occupied == 0;
     for (unsigned b = 0; b < 8; ++b, known >>= 8, occupied >>= 8, changed >>= 8) {
       if ((changed & 0xff) == 0) continue;
       bool child_is_new = is_new;
@@ -95,7 +101,7 @@ class StateTree::Tree : public octomap::OcTree {
       apply_byte(child, child_is_new, static_cast<unsigned>(known & 0xff),
                  static_cast<unsigned>(occupied & 0xff), static_cast<unsigned>(changed & 0xff));
     }
-    refresh(node);
+    settle(node, all_known, any_occupied, all_occupied);
   }
 
   /// A cube of 2^3 voxels: a node whose children are leaves.
@@ -111,7 +117,7 @@ class StateTree::Tree : public octomap::OcTree {
       child_of(node, leaf_is_new, v)->setLogOdds(value((occupied >> v & 1U) != 0));
       is_new = false;
     }
-    refresh(node);
+    settle(node, known == 0xff, occupied != 0, occupied == 0xff);
   }
 
   bool root_is_new_ = false;

@@ -11,7 +11,7 @@ struct Lengths {
   double jerk = 0, acceleration = 0, speed = 0;
 };
 
-Lengths piece_lengths(double distance, const MotionLimits& limits) {
+Lengths piece_lengths(double distance, const SCurveLimits& limits) {
   const double v = limits.speed, a = limits.acceleration, j = limits.jerk;
   Lengths t;
   // Up to the speed limit and down again.
@@ -39,7 +39,7 @@ SCurve::State advance(const SCurve::State& s, double jerk, double t) {
 
 }  // namespace
 
-SCurve::SCurve(double distance, const MotionLimits& limits) : distance_(distance) {
+SCurve::SCurve(double distance, const SCurveLimits& limits) : distance_(distance) {
   const Lengths t = piece_lengths(distance, limits);
   const std::array<double, 7> lengths{t.jerk, t.acceleration, t.jerk, t.speed,
                                       t.jerk, t.acceleration, t.jerk};

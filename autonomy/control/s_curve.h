@@ -5,7 +5,7 @@
 namespace arex {
 
 /// Limits of a motion along a line or about an axis: units are m or rad.
-struct MotionLimits {
+struct SCurveLimits {
   double speed = 0;
   double acceleration = 0;
   double jerk = 0;
@@ -18,7 +18,7 @@ class SCurve {
  public:
   SCurve() = default;
   /// @pre distance >= 0, limits > 0.
-  SCurve(double distance, const MotionLimits& limits);
+  SCurve(double distance, const SCurveLimits& limits);
 
   struct State {
     double position = 0;

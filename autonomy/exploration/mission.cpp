@@ -33,10 +33,22 @@ MotionRequest Mission::update(const Inputs& inputs) {
       }
       break;
     case MissionState::kTakeoff:
-      if (has_arrived(inputs)) enter(MissionState::kFly, inputs);
+      if (has_arrived(inputs)) {
+        const bool explores = config_.kind == MissionConfig::Kind::kExplore;
+        enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
+      }
+      break;
+    case MissionState::kEntry:
+      enter_area(inputs);
       break;
     case MissionState::kFly:
       fly(inputs);
+      break;
+    case MissionState::kExplore:
+      explore(inputs);
+      break;
+    case MissionState::kReturn:
+      fly_home(inputs);
       break;
     case MissionState::kLand:
       if (!inputs.armed) enter(MissionState::kDone, inputs);
@@ -80,9 +92,18 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
           std::string(kMissionStateNames[static_cast<std::size_t>(state)]));
   switch (state) {
     case MissionState::kTakeoff:
-      request_ = {MotionRequest::Kind::kTakeoff,
-                  inputs.odometry.X_OB.p + config_.takeoff_height_m * Vec3::UnitZ()};
+      home_O_ = inputs.odometry.X_OB.p + config_.takeoff_height_m * Vec3::UnitZ();
+      request_ = {MotionRequest::Kind::kTakeoff, home_O_};
       break;
+    case MissionState::kEntry:
+      waypoint_ = 0;
+      break;
+    case MissionState::kReturn:
+      request_ = {MotionRequest::Kind::kGoTo, home_O_};
+      events_(EventKind::kTargetSelected, describe(home_O_));
+      break;
+    case MissionState::kExplore:
+      break;  // hovers until the explorer's first word
     case MissionState::kFly:
       begin_flying();
       break;
@@ -98,22 +119,105 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
 }
 
 void Mission::begin_flying() {
-  if (config_.kind == MissionConfig::Kind::kWaypoints && !config_.waypoints_m.empty()) {
-    select_waypoint(0);
+  const bool has_waypoints = config_.kind != MissionConfig::Kind::kYawBurst;
+  if (has_waypoints && !config_.waypoints_m.empty()) select_waypoint(0);
+}
+
+void Mission::enter_area(const Inputs& inputs) {
+  const bool on_leg = request_.kind == MotionRequest::Kind::kLeg;
+  if (on_leg && !has_arrived(inputs)) return;
+  if (on_leg) ++waypoint_;
+  if (waypoint_ >= config_.entry_m.size()) {
+    enter(MissionState::kExplore, inputs);
+    return;
   }
+  inside_since_ = -1;
+  request_ = {MotionRequest::Kind::kLeg, config_.entry_m[waypoint_]};
+  events_(EventKind::kTargetSelected, describe(request_.goal_O));
 }
 
 void Mission::fly(const Inputs& inputs) {
+  const bool planned = request_.kind == MotionRequest::Kind::kGoTo;
   if (config_.kind == MissionConfig::Kind::kYawBurst) {
     spin(inputs);
   } else if (config_.waypoints_m.empty()) {
     enter(MissionState::kLand, inputs);
-  } else if (has_arrived(inputs)) {
-    targets_.push_back({request_.goal_O, inputs.now});
-    events_(EventKind::kTargetReached, describe(request_.goal_O));
-    if (waypoint_ + 1 < config_.waypoints_m.size()) {
-      select_waypoint(waypoint_ + 1);
+  } else if (planned ? inputs.progress == MotionProgress::kArrived : has_arrived(inputs)) {
+    reach(inputs);
+    next_waypoint(inputs);
+  } else if (planned && inputs.progress == MotionProgress::kFailed) {
+    events_(EventKind::kStuck, std::string(inputs.cause));
+    events_(EventKind::kTargetDropped, describe(request_.goal_O));
+    stuck_ = inputs.cause;
+    next_waypoint(inputs);
+  }
+}
+
+void Mission::reach(const Inputs& inputs) {
+  targets_.push_back({request_.goal_O, inputs.now});
+  events_(EventKind::kTargetReached, describe(request_.goal_O));
+}
+
+void Mission::next_waypoint(const Inputs& inputs) {
+  if (waypoint_ + 1 < config_.waypoints_m.size()) {
+    select_waypoint(waypoint_ + 1);
+  } else {
+    enter(MissionState::kLand, inputs);
+  }
+}
+
+void Mission::select_waypoint(std::size_t index) {
+  waypoint_ = index;
+  inside_since_ = -1;
+  const bool planned = config_.kind == MissionConfig::Kind::kGoals;
+  request_ = {planned ? MotionRequest::Kind::kGoTo : MotionRequest::Kind::kLeg,
+              config_.waypoints_m[index]};
+  events_(EventKind::kTargetSelected, describe(request_.goal_O));
+}
+
+void Mission::explore(const Inputs& inputs) {
+  if (stop_exploring_) {
+    enter(config_.land_at_start ? MissionState::kReturn : MissionState::kLand, inputs);
+    return;
+  }
+  if (request_.kind != MotionRequest::Kind::kGoTo) return;
+  if (target_progress_ != TargetProgress::kUnderWay) return;  // told; waits for the next decision
+  if (inputs.progress == MotionProgress::kArrived) {
+    reach(inputs);
+    target_progress_ = TargetProgress::kReached;
+  } else if (inputs.progress == MotionProgress::kFailed) {
+    events_(EventKind::kStuck, std::string(inputs.cause));
+    events_(EventKind::kTargetDropped, describe(request_.goal_O));
+    target_progress_ = TargetProgress::kUnreachable;
+  }
+}
+
+void Mission::decide(const Decision& decision) {
+  if (state_ != MissionState::kExplore) return;
+  if (decision.kind == DecisionKind::kStop) {
+    const auto reason = kStopReasonNames[static_cast<std::size_t>(decision.stop_reason)];
+    events_(decision.stop_reason == StopReason::kBattery ? EventKind::kBattery
+                                                         : EventKind::kMissionState,
+            "stop exploring: " + std::string(reason));
+    stop_exploring_ = true;
+  } else if (decision.kind == DecisionKind::kNewTarget) {
+    target_progress_ = TargetProgress::kUnderWay;
+    request_ = {MotionRequest::Kind::kGoTo, decision.goal_O, 0, decision.sequence};
+    events_(EventKind::kTargetSelected, describe(request_.goal_O));
+  }
+}
+
+void Mission::fly_home(const Inputs& inputs) {
+  if (inputs.progress == MotionProgress::kArrived) {
+    reach(inputs);
+    enter(MissionState::kLand, inputs);
+  } else if (inputs.progress == MotionProgress::kFailed) {
+    events_(EventKind::kStuck, std::string(inputs.cause));
+    if (++returns_ < config_.return_tries) {
+      events_(EventKind::kRecovery, "another way home");
+      request_.attempt = returns_;
     } else {
+      stuck_ = inputs.cause;
       enter(MissionState::kLand, inputs);
     }
   }
@@ -133,13 +237,6 @@ void Mission::spin(const Inputs& inputs) {
   std::array<char, 48> text{};
   std::snprintf(text.data(), text.size(), "yaw rate %.2f rad/s", rate);
   events_(EventKind::kTargetSelected, text.data());
-}
-
-void Mission::select_waypoint(std::size_t index) {
-  waypoint_ = index;
-  inside_since_ = -1;
-  request_ = {MotionRequest::Kind::kGoTo, config_.waypoints_m[index]};
-  events_(EventKind::kTargetSelected, describe(request_.goal_O));
 }
 
 bool Mission::has_arrived(const Inputs& inputs) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "exploration/explorer.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
 #include "messages/motion.h"
@@ -15,9 +16,14 @@ namespace arex {
 /// What the vehicle is sent out to do. Positions are in O: origin where it stood at start-up, x its
 /// heading then, z up.
 struct MissionConfig {
-  enum class Kind { kWaypoints, kYawBurst };
-  friend constexpr std::array<std::string_view, 2> enum_names(Kind) {
-    return {"waypoints", "yaw_burst"};
+  enum class Kind {
+    kWaypoints,  ///< straight legs through waypoints_m
+    kGoals,      ///< the planner's way through waypoints_m
+    kExplore,    ///< down entry_m, then wherever the explorer says
+    kYawBurst,
+  };
+  friend constexpr std::array<std::string_view, 4> enum_names(Kind) {
+    return {"waypoints", "goals", "explore", "yaw_burst"};
   }
 
   Kind kind = Kind::kWaypoints;
@@ -28,6 +34,9 @@ struct MissionConfig {
   double hold_s = 0.5;             ///< and for this long
   double settle_s = 3.0;           ///< standing still before arming: sensors initialise
   double max_time_s = 600;
+  std::vector<Vec3> entry_m;  ///< straight legs flown before exploring (garage: down the ramp)
+  bool land_at_start = true;  ///< of an exploration; false: where it ends (garage)
+  int return_tries = 3;       ///< before it lands where it is
   std::vector<double> yaw_rates_radps{1, 2, 3};  ///< of a yaw burst, one after the other
   double yaw_burst_s = 4.0;                      ///< length of each
   double lost_hover_s = 1.0;  ///< without odometry: level at hover thrust, then down
@@ -41,6 +50,9 @@ struct MissionConfig {
     f("hold_s", hold_s, "and for this long");
     f("settle_s", settle_s, "standing still before arming");
     f("max_time_s", max_time_s, "the mission fails when it is not over by then");
+    f("entry_m", entry_m, "x, y, z in O: straight legs flown before exploring");
+    f("land_at_start", land_at_start, "an exploration comes home; false: it lands where it ends");
+    f("return_tries", return_tries, "failed ways home before it lands where it is");
     f("yaw_rates_radps", yaw_rates_radps, "of a yaw burst, one after the other");
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
     f("lost_hover_s", lost_hover_s,
@@ -57,9 +69,19 @@ struct MissionConfig {
 };
 
 /// The mission's states, in order.
-enum class MissionState { kInitialise, kTakeoff, kFly, kLand, kLost, kDone };
-inline constexpr std::array<std::string_view, 6> kMissionStateNames{
-    "initialise", "takeoff", "fly", "land", "lost", "done"};
+enum class MissionState {
+  kInitialise,
+  kTakeoff,
+  kEntry,  ///< legs into the area to explore
+  kFly,    ///< waypoints, goals, yaw bursts
+  kExplore,
+  kReturn,
+  kLand,
+  kLost,
+  kDone,
+};
+inline constexpr std::array<std::string_view, 9> kMissionStateNames{
+    "initialise", "takeoff", "entry", "fly", "explore", "return", "land", "lost", "done"};
 
 /// A target that was flown to.
 struct MissionTarget {
@@ -80,11 +102,21 @@ class Mission {
     Odometry odometry;
     bool autopilot_ready = false;  ///< its own attitude filter has settled
     bool armed = false;
+    MotionProgress progress = MotionProgress::kUnderWay;  ///< of a kGoTo request
+    std::string_view cause;                               ///< why it failed
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);
 
+  /// Takes the explorer's word while exploring.
+  void decide(const Decision& decision);
+
+  [[nodiscard]] const MotionRequest& request() const { return request_; }
   [[nodiscard]] MissionState state() const { return state_; }
+  /// Progress with the explorer's target since its last decision.
+  [[nodiscard]] TargetProgress target_progress() const { return target_progress_; }
+  /// Why the mission failed; empty: it did not.
+  [[nodiscard]] const std::string& stuck() const { return stuck_; }
   /// Whether the odometry was lost for good: the mission ended where it stood.
   [[nodiscard]] bool lost() const { return lost_; }
   [[nodiscard]] const std::vector<MissionTarget>& targets() const { return targets_; }
@@ -92,6 +124,11 @@ class Mission {
  private:
   void enter(MissionState state, const Inputs& inputs);
   void begin_flying();
+  void enter_area(const Inputs& inputs);
+  void explore(const Inputs& inputs);
+  void fly_home(const Inputs& inputs);
+  void reach(const Inputs& inputs);
+  void next_waypoint(const Inputs& inputs);
   void fly(const Inputs& inputs);
   void select_waypoint(std::size_t index);
   void spin(const Inputs& inputs);
@@ -106,6 +143,11 @@ class Mission {
   Stamp inside_since_ = -1;  ///< when the vehicle came to rest within the goal's radius, -1: not
   bool was_armed_ = false;
   Stamp state_since_ = 0;
+  Vec3 home_O_ = Vec3::Zero();  ///< above the start, at take-off height
+  TargetProgress target_progress_ = TargetProgress::kUnderWay;
+  bool stop_exploring_ = false;
+  int returns_ = 0;
+  std::string stuck_;
   Stamp lost_since_ = -1;  ///< -1: odometry is there
   bool lost_ = false;
   MissionState interrupted_ = MissionState::kFly;  ///< what goes on when the odometry is back

@@ -9,7 +9,8 @@ struct MotionRequest {
   enum class Kind {
     kNone,     ///< motors off
     kTakeoff,  ///< straight up to `goal`
-    kGoTo,     ///< to `goal`, along whatever path the motion side finds
+    kLeg,      ///< to `goal` along a straight leg that is known to be free
+    kGoTo,     ///< to `goal`, along whatever path the planner finds
     kSpin,     ///< stay at `goal` and turn at `yaw_rate_radps`
     kLand,     ///< straight down until touchdown
     kLevel,    ///< no position to hold: level, at hover thrust
@@ -18,8 +19,12 @@ struct MotionRequest {
   Kind kind = Kind::kNone;
   Vec3 goal_O = Vec3::Zero();
   double yaw_rate_radps = 0;
+  int attempt = 0;  ///< tells two requests for the same goal apart
 
   bool operator==(const MotionRequest&) const = default;
 };
+
+/// How the vehicle fares with the request.
+enum class MotionProgress { kUnderWay, kArrived, kFailed };
 
 }  // namespace arex

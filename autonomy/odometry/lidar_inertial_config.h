@@ -154,6 +154,7 @@ struct OdometryHealthConfig {
   double recovery_radius_m = 2.0;
   double recovery_step_m = 1.0;
   double recovery_fraction = 0.5;
+  double recovery_margin = 1.15;
   int recovery_confirmations = 3;
 
   void fields(auto& f) {
@@ -173,6 +174,8 @@ struct OdometryHealthConfig {
     f("recovery_radius_m", recovery_radius_m, "guesses reach this far to each side");
     f("recovery_step_m", recovery_step_m, "spacing of the guesses");
     f("recovery_fraction", recovery_fraction, "matched share that accepts a recovery");
+    f("recovery_margin", recovery_margin,
+      "a found pose has this many times the matches of any that fits elsewhere");
     f("recovery_confirmations", recovery_confirmations,
       "good scans in a row before a found pose is called ok");
     f.check(min_matches > 0 && lost_scans > 0, "health counts > 0");

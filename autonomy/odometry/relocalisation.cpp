@@ -13,6 +13,8 @@ constexpr std::size_t kRefined = 6;       // best guesses that are refined
 constexpr int kRefinements = 6;           // updates of each
 constexpr double kScoredDistance = 0.3;   // a point this near its surfel counts, m
 constexpr double kDoubtedVelocity = 2.0;  // m/s
+constexpr double kSamePlace = 0.5;        // m
+constexpr double kSameAttitude = 0.3;     // rad
 
 struct Guess {
   Pose X_OB;
@@ -61,6 +63,34 @@ std::vector<Guess> search(const std::vector<ScanPoint>& points, const SurfelMap&
   return guesses;
 }
 
+/// Refines a pose by repeated updates that doubt it less and less. Nothing if it does not fit.
+std::optional<Relocalisation> refine(const Pose& X_OB, const std::vector<ScanPoint>& points,
+                                     const SurfelMap& map, const LidarInertialConfig& config,
+                                     const NavigationState& state, const ErrorMatrix& covariance) {
+  const OdometryHealthConfig& hc = config.health;
+  NavigationState x = state;
+  x.R_OB = X_OB.R;
+  x.p_OB = X_OB.p;
+  x.v_OB = Vec3::Zero();
+  ErrorStateFilter filter(config.imu);
+  filter.reset(x, covariance);
+  RegistrationReport report;
+  for (int i = 0; i < kRefinements; ++i) {
+    const double doubt = 1.0 / (1 << i);
+    filter.doubt_pose(0.5 * std::numbers::pi * doubt / hc.recovery_yaw_steps,
+                      hc.recovery_step_m * doubt, kDoubtedVelocity);
+    report = register_scan(points, map, config, filter);
+    if (!report.accepted) return std::nullopt;
+  }
+  if (report.matched < hc.recovery_fraction * report.points) return std::nullopt;
+  return Relocalisation{filter, report};
+}
+
+bool same_place(const NavigationState& a, const NavigationState& b) {
+  return (a.p_OB - b.p_OB).norm() < kSamePlace &&
+         so3::angle(a.R_OB.transpose() * b.R_OB) < kSameAttitude;
+}
+
 }  // namespace
 
 std::optional<Relocalisation> relocalise(const std::vector<ScanPoint>& points, const SurfelMap& map,
@@ -69,30 +99,28 @@ std::optional<Relocalisation> relocalise(const std::vector<ScanPoint>& points, c
                                          const ErrorMatrix& covariance) {
   const OdometryHealthConfig& hc = config.health;
   if (static_cast<int>(points.size()) < hc.min_matches) return std::nullopt;
+
+  // Where the IMU says it is comes first: a symmetric place has other poses that fit as well.
   const bool prediction_near = (state.p_OB - last_position_O).norm() < hc.recovery_radius_m;
+  if (prediction_near) {
+    auto near = refine(state.X_OB(), points, map, config, state, covariance);
+    if (near) return near;
+  }
+
   std::vector<Guess> guesses =
       search(points, map, hc, state, prediction_near ? state.p_OB : last_position_O);
   guesses.resize(std::min(guesses.size(), kRefined));
-
   std::optional<Relocalisation> best;
+  int rival = 0;  // matches of the best that stands elsewhere
   for (const Guess& guess : guesses) {
-    NavigationState x = state;
-    x.R_OB = guess.X_OB.R;
-    x.p_OB = guess.X_OB.p;
-    x.v_OB = Vec3::Zero();
-    ErrorStateFilter filter(config.imu);
-    filter.reset(x, covariance);
-    RegistrationReport report;
-    for (int i = 0; i < kRefinements; ++i) {
-      const double doubt = 1.0 / (1 << i);
-      filter.doubt_pose(0.5 * std::numbers::pi * doubt / hc.recovery_yaw_steps,
-                        hc.recovery_step_m * doubt, kDoubtedVelocity);
-      report = register_scan(points, map, config, filter);
-      if (!report.accepted) break;
+    auto found = refine(guess.X_OB, points, map, config, state, covariance);
+    if (!found) continue;
+    if (!best || found->report.matched > best->report.matched) std::swap(found, best);
+    if (found && !same_place(found->filter.state(), best->filter.state())) {
+      rival = std::max(rival, found->report.matched);
     }
-    if (!report.accepted || report.matched < hc.recovery_fraction * report.points) continue;
-    if (!best || report.matched > best->report.matched) best = Relocalisation{filter, report};
   }
+  if (best && best->report.matched < hc.recovery_margin * rival) return std::nullopt;
   return best;
 }
 

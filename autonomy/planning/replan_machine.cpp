@@ -128,13 +128,18 @@ MotionState ReplanMachine::state_at(Stamp stamp, const Odometry& odometry) const
   return {odometry.X_OB.p, odometry.v_OB, Vec3::Zero()};
 }
 
+void ReplanMachine::start_at(const Vec3& p_OB, double yaw_rad, Stamp now) {
+  current_ = {hold(p_OB, planner_.config().timing_knot_span_s), now, now};
+  next_.reset();
+  heading_ = {yaw_rad, 0.0};
+  enter(ReplanState::kWaitTarget, now);
+}
+
 void ReplanMachine::tick(const GridView& grid, const Odometry& odometry, Stamp now) {
   advance(now);
   if (state_ == ReplanState::kInit) {
     if (!is_usable(odometry.status)) return;
-    current_ = {hold(odometry.X_OB.p, planner_.config().timing_knot_span_s), now, now};
-    heading_ = {so3::yaw(odometry.X_OB.R), 0.0};
-    enter(ReplanState::kWaitTarget, now);
+    start_at(odometry.X_OB.p, so3::yaw(odometry.X_OB.R), now);
   }
   if (!is_usable(odometry.status)) {
     const bool flying = state_ == ReplanState::kExecTraj || state_ == ReplanState::kReplanTraj;

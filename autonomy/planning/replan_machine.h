@@ -108,6 +108,9 @@ class ReplanMachine {
   ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner, const YawConfig& yaw,
                 std::uint64_t seed);
 
+  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  void start_at(const Vec3& p_OB, double yaw_rad, Stamp now);
+
   /// A new target; `guide` is a polyline in O that leads there (empty: straight).
   void set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now);
   /// A better guide to the same target, as the map grows.

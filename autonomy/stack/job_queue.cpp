@@ -81,6 +81,14 @@ void JobQueue::enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visi
   }
 }
 
+void JobQueue::run(Lane lane, const std::function<void()>& work) {
+  const double begin = thread_seconds();
+  work();
+  const auto seconds = static_cast<float>(thread_seconds() - begin);
+  const std::lock_guard lock(mutex_);
+  lanes_.at(lane).seconds.push_back(seconds);
+}
+
 void JobQueue::advance(Stamp now) {
   for (;;) {
     std::unique_lock lock(mutex_);

@@ -51,6 +51,9 @@ class JobQueue {
   /// out while it exposes the next frame. It does not occupy the lane in simulated time.
   void schedule(Lane lane, Stamp visible_at, Work work);
 
+  /// Does light work of a lane at once on the caller's thread, only to have it timed with the rest.
+  void run(Lane lane, const std::function<void()>& work);
+
   /// Delivers every result that is visible at `now`, in order of visibility, then of start.
   /// Rethrows what a job threw.
   void advance(Stamp now);

@@ -18,6 +18,12 @@ bool holds_position(MotionRequest::Kind kind) {
 LegMotion::LegMotion(const TimedPathConfig& path, const CautionConfig& caution)
     : path_config_(path), caution_(caution), path_(path, Vec3::Zero(), 0) {}
 
+void LegMotion::take_over(const TrajectorySetpoint& from) {
+  path_ = TimedPath(path_config_, from.p_OB, from.yaw_rad);
+  spin_yaw_rad_ = spin_rate_radps_ = 0;
+  path_time_s_ = 0;
+}
+
 TrajectorySetpoint LegMotion::update(Stamp now, const MotionRequest& request,
                                      const Odometry& odometry, bool follows) {
   if (!(request == request_)) plan(request, odometry);
@@ -49,7 +55,7 @@ void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
     case MotionRequest::Kind::kTakeoff:
       path_.climb_to(request.goal_O.z());
       break;
-    case MotionRequest::Kind::kGoTo:
+    case MotionRequest::Kind::kLeg:
       path_.fly_to(request.goal_O);
       break;
     case MotionRequest::Kind::kLand:

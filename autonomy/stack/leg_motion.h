@@ -27,6 +27,9 @@ class LegMotion {
  public:
   LegMotion(const TimedPathConfig& path, const CautionConfig& caution);
 
+  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  void take_over(const TrajectorySetpoint& from);
+
   /// One control step. @param follows the autopilot is past its spin-up.
   TrajectorySetpoint update(Stamp now, const MotionRequest& request, const Odometry& odometry,
                             bool follows);

@@ -1,22 +1,22 @@
 #include "stack/stack.h"
 
-#include <algorithm>
-#include <iterator>
 #include <utility>
 
 namespace arex {
-Stack::Stack(const StackConfig& config, JobQueue& jobs)
+
+Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
     : config_(config),
       jobs_(jobs),
       lidar_inertial_(config.odometry.lidar_inertial, config.vehicle),
       odometry_lane_(jobs.add_lane("odometry")),
-      cloud_(config.mapping.cloud),
-      cloud_lane_(jobs.add_lane("cloud")),
+      energy_(config.exploration.explorer.consumption),
+      perception_(config, jobs),
+      explorer_(config.exploration.explorer, config.mapping.resolution_m, seed),
+      explorer_lane_(jobs.add_lane("exploration")),
       mission_(config.mission,
-               [this](EventKind kind, const std::string& detail) {
-                 events_.push_back({now_, kind, detail});
-               }),
-      motion_(config.path, config.caution),
+               [this](EventKind kind, const std::string& detail) { report(kind, detail); }),
+      legs_(config.path, config.caution),
+      navigator_(config.planning, jobs, seed),
       tracker_(config.control, config.vehicle),
       control_period_(from_seconds(1 / config.control.rate_hz)) {}
 
@@ -30,6 +30,10 @@ void Stack::add_imu(const ImuSample& imu) {
 
 void Stack::add_autopilot(const AutopilotStatus& status) { autopilot_ = status; }
 
+void Stack::add_battery(const BatterySample& battery) {
+  energy_.add(battery, odometry_.v_OB.norm(), !autopilot_.landed);
+}
+
 void Stack::add_mocap(const MocapSample& mocap) {
   if (config_.odometry.source != OdometryConfig::Source::kMocap) return;
   Odometry odometry = odometry_;
@@ -41,58 +45,88 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
-  if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) return;
+  if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) {
+    perception_.add_scan(now_, scan);
+    return;
+  }
   jobs_.start(odometry_lane_, now_, from_seconds(config_.odometry.latency_s),
               [this, job = lidar_inertial_.prepare(scan)]() -> JobQueue::Delivery {
                 return [this, update = lidar_inertial_.correct(job)] {
                   lidar_inertial_.apply(update);
                   set_odometry(lidar_inertial_.odometry());
-                  map(update);
+                  perception_.add_scan(now_, update);
                 };
               });
 }
 
-void Stack::map(const ScanUpdate& update) {
-  if (!update.points_O || update.points_O->empty()) return;
-  jobs_.start(cloud_lane_, now_, 0,
-              [this, points = update.points_O, p_OB = update.state.p_OB.cast<float>().eval(),
-               range = static_cast<float>(config_.mapping.cloud_range_m)]() -> JobQueue::Delivery {
-                std::vector<Vec3f> near;
-                near.reserve(points->size());
-                std::copy_if(points->begin(), points->end(), std::back_inserter(near),
-                             [&](const Vec3f& p) { return (p - p_OB).norm() <= range; });
-                cloud_.insert(near);
-                return nullptr;
-              });
-}
-
-void Stack::add_depth(const DepthImagePtr& depth) { depth_ = depth; }
+void Stack::add_depth(const DepthImagePtr& depth) { perception_.add_depth(now_, depth); }
 
 bool Stack::accepts_depth(Stamp stamp) {
-  if (!config_.mapping.use_depth || stamp < next_depth_) return false;
+  if (!config_.mapping.local.use_depth || stamp < next_depth_) return false;
   next_depth_ += from_seconds(1 / config_.mapping.depth_rate_hz);
   return true;
+}
+
+void Stack::set_odometry(const Odometry& odometry) {
+  if (odometry.status != odometry_.status) {
+    report(EventKind::kOdometryStatus,
+           std::string(kOdometryStatusNames[static_cast<std::size_t>(odometry.status)]));
+  }
+  odometry_ = odometry;
+  perception_.add_odometry(odometry);
 }
 
 std::optional<AttitudeCommand> Stack::tick() {
   if (now_ < next_control_) return std::nullopt;
   next_control_ += control_period_;
-  const MotionRequest request =
-      mission_.update({now_, odometry_, autopilot_.ready, autopilot_.armed});
-  setpoint_ = motion_.update(now_, request, odometry_, autopilot_.follows);
-  return control(request);
+  decide();
+  // The navigator's word counts for the request that it serves, not for one it has not seen yet.
+  const bool serves = navigating_ && navigator_.request() == mission_.request();
+  request_ = mission_.update({now_, odometry_, autopilot_.ready, autopilot_.armed,
+                              serves ? navigator_.progress() : MotionProgress::kUnderWay,
+                              navigator_.cause()});
+  setpoint_ = move(request_);
+  return control(request_);
 }
 
-void Stack::set_odometry(const Odometry& odometry) {
-  if (odometry.status != odometry_.status) {
-    events_.push_back(
-        {now_, EventKind::kOdometryStatus,
-         std::string(kOdometryStatusNames[static_cast<std::size_t>(odometry.status)])});
+void Stack::decide() {
+  if (mission_.state() != MissionState::kExplore || !perception_.map_2d()) return;
+  const TargetProgress progress = mission_.target_progress();
+  const bool told = progress != TargetProgress::kUnderWay;
+  if (!jobs_.is_free(explorer_lane_, now_) || (now_ < next_decision_ && !told)) return;
+  next_decision_ = now_ + from_seconds(1 / config_.exploration.decision_rate_hz);
+  ExplorerInput input{now_, odometry_.X_OB.p, Vec3::Zero(), progress, energy_};
+  jobs_.start(explorer_lane_, now_, from_seconds(config_.exploration.latency_s),
+              [this, input, map = perception_.map_2d()]() -> JobQueue::Delivery {
+                return [this, decision = explorer_.decide(*map, input)] {
+                  mission_.decide(decision);
+                  decisions_.push_back(decision);
+                };
+              });
+}
+
+TrajectorySetpoint Stack::move(const MotionRequest& request) {
+  if (request.kind != MotionRequest::Kind::kGoTo) {
+    if (navigating_) legs_.take_over(setpoint_);
+    navigating_ = false;
+    return legs_.update(now_, request, odometry_, autopilot_.follows);
   }
-  odometry_ = odometry;
+  if (!navigating_) navigator_.take_over(setpoint_, now_);
+  if (!navigating_ || !(request == navigator_.request())) {
+    navigator_.fly_to(request, odometry_, perception_.map_2d(), now_);
+  }
+  navigating_ = true;
+  const TrajectorySetpoint setpoint =
+      navigator_.update(perception_.grid(), perception_.map_2d(), odometry_, now_);
+  for (const PlannerEvent& event : navigator_.take_events()) {
+    if (event.kind == PlannerEventKind::kStateChanged || event.kind == PlannerEventKind::kPlanned) {
+      continue;  // many a second
+    }
+    report(EventKind::kPlanner,
+           std::string(to_string(event.kind)) + " " + std::string(to_string(event.cause)));
+  }
+  return setpoint;
 }
-
-std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }
 
 AttitudeCommand Stack::control(const MotionRequest& request) {
   AttitudeCommand command;
@@ -120,5 +154,13 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
   command.thrust_n = output.thrust_n;
   return command;
 }
+
+void Stack::report(EventKind kind, const std::string& detail) {
+  events_.push_back({now_, kind, detail});
+}
+
+std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }
+
+std::vector<Decision> Stack::take_decisions() { return std::exchange(decisions_, {}); }
 
 }  // namespace arex

@@ -37,7 +37,9 @@ void FlightScorer::sample(const Truth& truth, const Stack& stack, bool flying,
     ++tracking_count_;
   }
   if (truth.stamp % kRowPeriod != 0) return;
-  if (state == MissionState::kFly) last_clearance_m_ = clearance_.measure(truth);
+  const bool en_route = state == MissionState::kFly || state == MissionState::kEntry ||
+                        state == MissionState::kExplore || state == MissionState::kReturn;
+  if (en_route) last_clearance_m_ = clearance_.measure(truth);
   if (recorder) write_row(truth, X_OB, tracking_error, battery, *recorder);
 }
 

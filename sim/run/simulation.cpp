@@ -54,7 +54,7 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       jobs_(threads),
       lidar_lane_(jobs_.add_lane("lidar")),
       depth_lane_(jobs_.add_lane("depth")),
-      stack_(config_.stack, jobs_) {}
+      stack_(config_.stack, jobs_, config_.seed) {}
 
 Simulation::~Simulation() { jobs_.stop(); }
 
@@ -84,6 +84,7 @@ void Simulation::fire_imu() {
   if (now_ % kStatusPeriod == 0) {
     const BatteryState& battery = physics_.battery();
     autopilot_.add_battery({now_, battery.voltage_v, battery.current_a});
+    stack_.add_battery({now_, battery.voltage_v, battery.current_a});
     if (config_.stack.odometry.source == OdometryConfig::Source::kMocap) {
       const Pose X_OW = scorer_.X_WO().inverse();
       stack_.add_mocap({now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB});
@@ -201,8 +202,8 @@ void Simulation::record() {
 
 void Simulation::write_cloud() {
   // Behind the insertions of the same lane, so that the file is the map of this moment.
-  jobs_.start(stack_.cloud_lane(), now_, 0, [this]() -> JobQueue::Delivery {
-    recorder_->write_cloud(stack_.cloud().points());
+  jobs_.start(stack_.perception().cloud_lane(), now_, 0, [this]() -> JobQueue::Delivery {
+    recorder_->write_cloud(stack_.perception().cloud().points());
     return nullptr;
   });
 }
@@ -219,6 +220,8 @@ void Simulation::judge() {
   } else if (stack_.mission().state() == MissionState::kDone) {
     if (stack_.mission().lost()) {
       end(Outcome::kLost, "no odometry");
+    } else if (!stack_.mission().stuck().empty()) {
+      end(Outcome::kStuck, stack_.mission().stuck());
     } else {
       end(Outcome::kSucceeded, "mission done");
     }
@@ -250,7 +253,7 @@ FlightResult Simulation::finish() {
   result.collisions = collisions_;
   result.targets = stack_.mission().targets();
   result.flight = scorer_.score(physics_.truth(), stack_);
-  const std::vector<Vec3f> cloud = stack_.cloud().points();
+  const std::vector<Vec3f> cloud = stack_.perception().cloud().points();
   if (!cloud.empty()) {
     if (recorder_) recorder_->write_cloud(cloud);
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the

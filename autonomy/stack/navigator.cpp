@@ -1,0 +1,75 @@
+#include "stack/navigator.h"
+
+namespace arex {
+
+Navigator::Navigator(const PlanningConfig& config, JobQueue& jobs, std::uint64_t seed)
+    : config_(config),
+      jobs_(jobs),
+      planner_lane_(jobs.add_lane("planner")),
+      guide_lane_(jobs.add_lane("guide")),
+      machine_(config.replan, config.local, config.yaw, seed),
+      check_period_(from_seconds(1 / config.replan.check_rate_hz)) {}
+
+void Navigator::take_over(const TrajectorySetpoint& from, Stamp now) {
+  machine_.start_at(from.p_OB, from.yaw_rad, now);
+  next_check_ = now;
+}
+
+void Navigator::fly_to(const MotionRequest& request, const Odometry& odometry,
+                       const std::shared_ptr<const OccupancyMap2D>& map, Stamp now) {
+  request_ = request;
+  ++goal_number_;
+  has_target_ = false;
+  progress_ = MotionProgress::kUnderWay;
+  if (config_.guide.mode == GuideMode::kStraight || !map) {
+    machine_.set_target(request_.goal_O, {}, now);
+    has_target_ = true;
+  } else {
+    start_guide(odometry, map, now);
+  }
+}
+
+void Navigator::start_guide(const Odometry& odometry,
+                            const std::shared_ptr<const OccupancyMap2D>& map, Stamp now) {
+  next_guide_ = now + from_seconds(1 / config_.guide_rate_hz);
+  jobs_.start(
+      guide_lane_, now, from_seconds(config_.guide_latency_s),
+      [this, map, from = odometry.X_OB.p, to = request_.goal_O, number = goal_number_, now,
+       latency = from_seconds(config_.guide_latency_s)]() -> JobQueue::Delivery {
+        const GuidePath path = plan_guide(*map, from.head<2>(), to.head<2>(), config_.guide);
+        return [this, guide = lift_path(path.points, from.z(), to.z()), number, now, latency] {
+          if (number != goal_number_) return;
+          if (has_target_) {
+            machine_.set_guide(guide);
+          } else {
+            machine_.set_target(request_.goal_O, guide, now + latency);
+            has_target_ = true;
+          }
+        };
+      });
+}
+
+TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& grid,
+                                     const std::shared_ptr<const OccupancyMap2D>& map,
+                                     const Odometry& odometry, Stamp now) {
+  if (grid && now >= next_check_) {
+    next_check_ = now + check_period_;
+    jobs_.run(planner_lane_, [&] { machine_.tick(grid->view, odometry, now); });
+  }
+  const bool guided = config_.guide.mode == GuideMode::kAstar && map && has_target_;
+  if (guided && progress_ == MotionProgress::kUnderWay && now >= next_guide_) {
+    start_guide(odometry, map, now);
+  }
+  for (const PlannerEvent& event : machine_.take_events()) {
+    if (event.kind == PlannerEventKind::kTargetReached && has_target_) {
+      progress_ = MotionProgress::kArrived;
+    }
+    events_.push_back(event);
+  }
+  if (has_target_ && progress_ == MotionProgress::kUnderWay && machine_.needs_target()) {
+    progress_ = MotionProgress::kFailed;
+  }
+  return machine_.setpoint(now);
+}
+
+}  // namespace arex

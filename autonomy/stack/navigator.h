@@ -1,0 +1,60 @@
+#pragma once
+
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "mapping/local_grid.h"
+#include "messages/motion.h"
+#include "planning/guide_path.h"
+#include "planning/replan_machine.h"
+#include "stack/job_queue.h"
+#include "stack/stack_config.h"
+
+namespace arex {
+
+/// Flies to goals that are further than the local grid: a guide over the 2D map in its own lane,
+/// the replanning machine along it.
+class Navigator {
+ public:
+  Navigator(const PlanningConfig& config, JobQueue& jobs, std::uint64_t seed);
+
+  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  void take_over(const TrajectorySetpoint& from, Stamp now);
+  /// A new goal. @pre the request is a kGoTo.
+  void fly_to(const MotionRequest& request, const Odometry& odometry,
+              const std::shared_ptr<const OccupancyMap2D>& map, Stamp now);
+
+  /// One control step. @param grid, map the newest; may be null before the first.
+  TrajectorySetpoint update(const std::shared_ptr<const GridSnapshot>& grid,
+                            const std::shared_ptr<const OccupancyMap2D>& map,
+                            const Odometry& odometry, Stamp now);
+
+  /// The request that it serves.
+  [[nodiscard]] const MotionRequest& request() const { return request_; }
+  [[nodiscard]] MotionProgress progress() const { return progress_; }
+  [[nodiscard]] std::string_view cause() const { return to_string(machine_.cause()); }
+  [[nodiscard]] const ReplanMachine& machine() const { return machine_; }
+  std::vector<PlannerEvent> take_events() { return std::exchange(events_, {}); }
+
+ private:
+  void start_guide(const Odometry& odometry, const std::shared_ptr<const OccupancyMap2D>& map,
+                   Stamp now);
+
+  PlanningConfig config_;
+  JobQueue& jobs_;
+  JobQueue::Lane planner_lane_;
+  JobQueue::Lane guide_lane_;
+  ReplanMachine machine_;
+  Stamp check_period_;
+  Stamp next_check_ = 0;
+  Stamp next_guide_ = 0;
+  MotionRequest request_;
+  int goal_number_ = 0;      ///< guides for older goals are dropped
+  bool has_target_ = false;  ///< the machine knows the goal
+  MotionProgress progress_ = MotionProgress::kArrived;
+  std::vector<PlannerEvent> events_;
+};
+
+}  // namespace arex

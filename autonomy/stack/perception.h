@@ -1,0 +1,62 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+
+#include "mapping/mapper.h"
+#include "mapping/point_cloud_map.h"
+#include "messages/registered_scan.h"
+#include "odometry/lidar_inertial_odometry.h"
+#include "stack/job_queue.h"
+#include "stack/stack_config.h"
+
+namespace arex {
+
+/// From measurements to maps: places LiDAR and depth frames in O by the odometry's poses, feeds the
+/// maps in their lanes and hands on snapshots.
+class Perception {
+ public:
+  Perception(const StackConfig& config, JobQueue& jobs);
+
+  /// Every estimate, in order: depth frames are placed by the poses around their stamp.
+  void add_odometry(const Odometry& odometry);
+  /// An undistorted frame of the odometry.
+  void add_scan(Stamp now, const ScanUpdate& update);
+  /// A raw frame, placed by the poses kept: for odometry sources that don't undistort.
+  void add_scan(Stamp now, const LidarScanPtr& scan);
+  void add_depth(Stamp now, const DepthImagePtr& depth);
+
+  /// The newest local grid; null before the first frame.
+  [[nodiscard]] const std::shared_ptr<const GridSnapshot>& grid() const { return grid_; }
+  /// The newest 2D map; null before the first.
+  [[nodiscard]] const std::shared_ptr<const OccupancyMap2D>& map_2d() const { return map_2d_; }
+
+  // What follows belongs to its lane: read it in a job of that lane, or when the jobs are drained.
+  [[nodiscard]] const Mapper& mapper() const { return mapper_; }
+  [[nodiscard]] JobQueue::Lane mapping_lane() const { return mapping_lane_; }
+  [[nodiscard]] const PointCloudMap& cloud() const { return cloud_; }
+  [[nodiscard]] JobQueue::Lane cloud_lane() const { return cloud_lane_; }
+
+ private:
+  struct StampedPose {
+    Stamp stamp = 0;
+    Pose X_OB;
+  };
+  [[nodiscard]] Pose pose_at(Stamp stamp) const;
+  void add(Stamp now, const RegisteredScan& scan);
+
+  MappingConfig config_;
+  Pose X_BL_;
+  Pose X_BC_;
+  JobQueue& jobs_;
+  Mapper mapper_;
+  PointCloudMap cloud_;
+  JobQueue::Lane mapping_lane_;
+  JobQueue::Lane cloud_lane_;
+  std::deque<StampedPose> poses_;
+  Stamp next_map_2d_ = 0;
+  std::shared_ptr<const GridSnapshot> grid_;
+  std::shared_ptr<const OccupancyMap2D> map_2d_;
+};
+
+}  // namespace arex

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "control/timed_path.h"
+#include "control/tracker.h"
+#include "exploration/explorer.h"
+#include "exploration/mission.h"
+#include "mapping/mapping_config.h"
+#include "mapping/point_cloud_map.h"
+#include "messages/vehicle.h"
+#include "odometry/lidar_inertial_config.h"
+#include "planning/guide_path.h"
+#include "planning/replan_machine.h"
+#include "stack/leg_motion.h"
+
+namespace arex {
+
+struct OdometryConfig {
+  enum class Source { kLidarInertial, kMocap };
+  friend constexpr std::array<std::string_view, 2> enum_names(Source) {
+    return {"lidar_inertial", "mocap"};
+  }
+
+  Source source = Source::kLidarInertial;
+  double latency_s = 0.020;  ///< modelled compute time of a scan update
+  LidarInertialConfig lidar_inertial;
+
+  void fields(auto& f) {
+    f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
+    f("latency_s", latency_s, "modelled compute time of a scan update");
+    f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
+    f.check(latency_s >= 0, "latency_s >= 0");
+  }
+};
+
+struct MappingConfig {
+  bool enabled = true;
+  double resolution_m = 0.1;  ///< paper, IV-A
+  double latency_s = 0.020;   ///< modelled compute time of one frame
+  double depth_rate_hz = 10;
+  double map_2d_rate_hz = 2;
+  double cloud_range_m = 20;  ///< angle noise of 0.1 deg spreads what lies further over a voxel
+  PointCloudMapConfig cloud;
+  LocalGridConfig local;  ///< its keys stand directly under `mapping`
+  GlobalMapConfig global;
+
+  void fields(auto& f) {
+    f("enabled", enabled, "local grid, OctoMap and 2D map: what the planner and the explorer need");
+    f("resolution_m", resolution_m, "of the grids (paper, IV-A)");
+    f("latency_s", latency_s, "modelled compute time of one frame");
+    f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
+    f("map_2d_rate_hz", map_2d_rate_hz, "how often the 2D map is handed on");
+    f("cloud_range_m", cloud_range_m, "points further from the vehicle wait until it is nearer");
+    f("cloud", cloud, "global point cloud");
+    local.fields(f);
+    f("global", global, "OctoMap and 2D occupancy of the mission");
+    f.check(resolution_m > 0, "resolution_m > 0");
+    f.check(latency_s >= 0, "latency_s >= 0");
+    f.check(depth_rate_hz > 0 && depth_rate_hz <= 30, "0 < depth_rate_hz <= 30");
+    f.check(map_2d_rate_hz > 0, "map_2d_rate_hz > 0");
+    f.check(cloud_range_m > 0, "cloud_range_m > 0");
+  }
+};
+
+struct PlanningConfig {
+  double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, IV-A)
+  double guide_rate_hz = 1.0;    ///< a new guide while the map grows
+  double guide_latency_s = 0.1;  ///< modelled compute time of a guide
+  ReplanConfig replan;
+  LocalPlannerConfig local;
+  YawConfig yaw;
+  GuideConfig guide;
+
+  void fields(auto& f) {
+    f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+    f("guide_rate_hz", guide_rate_hz, "how often the guide follows the growing map");
+    f("guide_latency_s", guide_latency_s, "modelled compute time of a guide");
+    f("replan", replan, "replanning state machine");
+    f("local", local, "B-spline planner");
+    f("yaw", yaw, "heading along the path");
+    f("guide", guide, "global guide path");
+    f.check(inflation_m >= 0 && inflation_m <= 2, "0 <= inflation_m <= 2");
+    f.check(guide_rate_hz > 0, "guide_rate_hz > 0");
+    f.check(guide_latency_s >= 0, "guide_latency_s >= 0");
+  }
+};
+
+struct ExplorationConfig {
+  double decision_rate_hz = 1.0;
+  double latency_s = 0.05;  ///< modelled compute time of a decision
+  ExplorerConfig explorer;  ///< its keys stand directly under `exploration`
+
+  void fields(auto& f) {
+    f("decision_rate_hz", decision_rate_hz, "how often the explorer looks at its target");
+    f("latency_s", latency_s, "modelled compute time of a decision");
+    explorer.fields(f);
+    f.check(decision_rate_hz > 0, "decision_rate_hz > 0");
+    f.check(latency_s >= 0, "latency_s >= 0");
+  }
+};
+
+/// Everything that can be set in the flight software, by module.
+struct StackConfig {
+  VehicleConfig vehicle;
+  OdometryConfig odometry;
+  MappingConfig mapping;
+  PlanningConfig planning;
+  ExplorationConfig exploration;
+  MissionConfig mission;
+  TimedPathConfig path;
+  CautionConfig caution;
+  TrackerConfig control;
+
+  void fields(auto& f) {
+    f("vehicle", vehicle, "what the stack believes of its vehicle");
+    f("odometry", odometry, "pose and velocity");
+    f("mapping", mapping, "maps of the surroundings");
+    f("planning", planning, "from a goal to a trajectory");
+    f("exploration", exploration, "from the 2D map to the next goal");
+    f("mission", mission, "what to do");
+    f("path", path, "timed paths along straight legs");
+    f("caution", caution, "answers to a weak odometry");
+    f("control", control, "trajectory tracking");
+    const bool plans = mission.kind == MissionConfig::Kind::kGoals ||
+                       mission.kind == MissionConfig::Kind::kExplore;
+    f.check(mapping.enabled || !plans, "mapping.enabled true for missions that plan");
+  }
+};
+
+}  // namespace arex

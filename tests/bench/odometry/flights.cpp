@@ -41,8 +41,7 @@ test::AnalyticMotion make_motion(const FlightOptions& options) {
   if (options.world == "forest") {
     return {test::loop_points(36, 18, 1.5, options.speed_mps, kKnot, 2), kKnot, kRest};
   }
-  // Down the ramp, along the middle aisle, round one side's bays by the cross aisles, and along the
-  // middle aisle again.
+  // As scenarios/garage_waypoints.yaml: down the ramp, along the aisles and back by the middle one.
   std::vector<Vec4> points{Vec4::Zero()};
   const worlds::GaragePlan plan = worlds::plan_garage(worlds::GarageRecipe{}, options.seed);
   const double crest = plan.crest_x, foot = plan.foot_x;
@@ -51,11 +50,11 @@ test::AnalyticMotion make_motion(const FlightOptions& options) {
           {0, 0, 1.3},
           {crest, 0, 1.3},
           {foot, 0, -7.2},
-          {62, 0, -7.2},
-          {62, 16.5, -7.2},
-          {22, 16.5, -7.2},
-          {22, 0, -7.2},
-          {85, 0, -7.2}},
+          {58, 0, -7.2},
+          {58, 16.5, -7.2},
+          {97, 16.5, -7.2},
+          {97, 0, -7.2},
+          {40, 0, -7.2}},
          step);
   return {points, kKnot, kRest};
 }

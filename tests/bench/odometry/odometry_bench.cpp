@@ -114,7 +114,7 @@ Result fly(bench::Flight& flight, const LidarInertialConfig& config, std::ofstre
   }
   result.matched /= std::max<double>(1, static_cast<double>(result.update_ms.size()));
   result.map_bytes = odometry.map().memory_bytes();
-  if (pending) result.last = update.state;
+  result.last = update.state;
   return result;
 }
 

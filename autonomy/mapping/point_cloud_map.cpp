@@ -1,5 +1,6 @@
 #include "mapping/point_cloud_map.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace arex {
@@ -72,10 +73,10 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
   }
 }
 
-std::vector<Vec3f> PointCloudMap::points() const {
+std::vector<Vec3f> PointCloudMap::points(std::size_t first) const {
   std::vector<Vec3f> out;
-  out.reserve(voxels_.size());
-  for (const Voxel& voxel : voxels_) out.push_back(voxel.mean);
+  out.reserve(voxels_.size() - std::min(first, voxels_.size()));
+  for (std::size_t i = first; i < voxels_.size(); ++i) out.push_back(voxels_[i].mean);
   return out;
 }
 

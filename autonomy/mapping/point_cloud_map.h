@@ -31,8 +31,8 @@ class PointCloudMap {
   [[nodiscard]] std::size_t size() const { return voxels_.size(); }
   /// Points that found no room.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
-  /// One point per voxel in O, m, in the order of their first sight.
-  [[nodiscard]] std::vector<Vec3f> points() const;
+  /// One point per voxel in O, m, in the order of their first sight, from the `first` on.
+  [[nodiscard]] std::vector<Vec3f> points(std::size_t first = 0) const;
 
  private:
   struct Voxel {

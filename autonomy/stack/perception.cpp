@@ -104,9 +104,12 @@ void Perception::add(Stamp now, const RegisteredScan& scan) {
                 auto map_2d = with_map_2d
                                   ? std::make_shared<const OccupancyMap2D>(mapper_.occupancy_2d())
                                   : nullptr;
-                return [this, grid = std::move(grid), map_2d = std::move(map_2d)] {
+                const double volume = map_2d ? mapper_.global().known_volume() : 0.0;
+                return [this, grid = std::move(grid), map_2d = std::move(map_2d), volume] {
                   grid_ = grid;
-                  if (map_2d) map_2d_ = map_2d;
+                  if (!map_2d) return;
+                  map_2d_ = map_2d;
+                  known_volume_m3_ = volume;
                 };
               });
 }

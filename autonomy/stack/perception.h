@@ -31,6 +31,9 @@ class Perception {
   /// The newest 2D map; null before the first.
   [[nodiscard]] const std::shared_ptr<const OccupancyMap2D>& map_2d() const { return map_2d_; }
 
+  /// Volume that the map knew when map_2d() was taken.
+  [[nodiscard]] double known_volume_m3() const { return known_volume_m3_; }
+
   // What follows belongs to its lane: read it in a job of that lane, or when the jobs are drained.
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
   [[nodiscard]] JobQueue::Lane mapping_lane() const { return mapping_lane_; }
@@ -57,6 +60,7 @@ class Perception {
   Stamp next_map_2d_ = 0;
   std::shared_ptr<const GridSnapshot> grid_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;
+  double known_volume_m3_ = 0;
 };
 
 }  // namespace arex

@@ -46,9 +46,9 @@ class ProgressLine {
     const double time = to_seconds(simulation.now());
     const Mission& mission = simulation.stack().mission();
     const auto state = kMissionStateNames[static_cast<std::size_t>(mission.state())];
-    std::fprintf(stderr, "\r%7.1f s  %-10.*s  targets %2zu  %5.2fx real time ", time,
-                 static_cast<int>(state.size()), state.data(), mission.targets().size(),
-                 time / wall);
+    std::fprintf(stderr, "\r%7.1f s  %-10.*s  targets %2zu  explored %3.0f %%  %5.2fx real time ",
+                 time, static_cast<int>(state.size()), state.data(), mission.targets().size(),
+                 100 * simulation.area_fraction(), time / wall);
     drawn_ = true;
   }
 
@@ -108,6 +108,9 @@ int run(const RunArguments& arguments) {
   const sim::FlightResult result = simulation.finish();
   if (bag) bag->close();
   recorder.write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
+  if (result.coverage) {
+    recorder.write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
+  }
   recorder.write_file("timing.csv", sim::timing_csv(result.timing));
   recorder.write_summary(
       sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}));

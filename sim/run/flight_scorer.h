@@ -39,6 +39,7 @@ class FlightScorer {
 
   /// O in W: where the stack's odometry began; until then where it should begin.
   [[nodiscard]] const Pose& X_WO() const { return X_WO_; }
+  [[nodiscard]] double distance_m() const { return distance_m_; }
   [[nodiscard]] FlightScore score(const Truth& truth, const Stack& stack) const;
 
  private:

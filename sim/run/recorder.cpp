@@ -44,7 +44,8 @@ Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_
       truth_(nullptr, &std::fclose),
       estimate_(nullptr, &std::fclose),
       events_(nullptr, &std::fclose),
-      flight_(nullptr, &std::fclose) {
+      flight_(nullptr, &std::fclose),
+      decisions_(nullptr, &std::fclose) {
   std::error_code error;
   std::filesystem::create_directories(directory_, error);
   if (error) throw std::runtime_error(directory_.string() + ": " + error.message());
@@ -57,6 +58,9 @@ Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_
                  "time_s,speed_mps,tracking_error_m,odometry_error_m,odometry_yaw_error_rad,"
                  "clearance_m,height_m,"
                  "battery_voltage_v,battery_power_w,battery_fraction\n");
+  decisions_ = open("decisions.csv",
+                    "time_s,decision,kind,source,previous_end,stop_reason,candidate,winner,x_m,y_m,"
+                    "verdict,information_m2,distance_m,angle_rad,direction,revenue\n");
   flush();
 }
 
@@ -86,7 +90,32 @@ void Recorder::flight(const FlightRow& row) {
                row.battery_power_w, row.battery_fraction);
 }
 
+void Recorder::decision(const Decision& decision) {
+  const auto name = [](const auto& names, auto value) {
+    return std::string(names[static_cast<std::size_t>(value)]);
+  };
+  const std::string head = name(kDecisionKindNames, decision.kind) + "," +
+                           name(kCandidateSourceNames, decision.source) + "," +
+                           name(kTargetEndNames, decision.previous_end) + "," +
+                           name(kStopReasonNames, decision.stop_reason);
+  if (decision.candidates.empty()) {
+    std::fprintf(decisions_.get(), "%.3f,%d,%s,,,,,,,,,,\n", to_seconds(decision.stamp),
+                 decision.sequence, head.c_str());
+  }
+  for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
+    const Candidate& c = decision.candidates[i];
+    std::array<char, 24> angle{};
+    if (c.angle_rad) std::snprintf(angle.data(), angle.size(), "%.4f", *c.angle_rad);
+    std::fprintf(decisions_.get(), "%.3f,%d,%s,%zu,%d,%.2f,%.2f,%s,%.3f,%.3f,%s,%.4f,%.4f\n",
+                 to_seconds(decision.stamp), decision.sequence, head.c_str(), i,
+                 decision.winner == i ? 1 : 0, c.point.x(), c.point.y(),
+                 name(kVerdictNames, c.verdict).c_str(), c.information_m2, c.distance_m,
+                 angle.data(), c.direction, c.revenue);
+  }
+}
+
 void Recorder::flush() {
+  check(decisions_.get(), "decisions.csv");
   check(truth_.get(), "truth.tum");
   check(estimate_.get(), "estimate.tum");
   check(events_.get(), "events.csv");
@@ -99,6 +128,10 @@ void Recorder::check(std::FILE* file, const char* name) {
 
 void Recorder::write_cloud(const std::vector<Vec3f>& points_O) const {
   if (!write_pcd(directory_ / "cloud.pcd", points_O)) fail(directory_ / "cloud.pcd");
+}
+
+void Recorder::write_maps(const Mapper& mapper) const {
+  if (!mapper.write(directory_)) fail(directory_ / "map.bt");
 }
 
 void Recorder::write_file(const std::string& name, const std::string& content) {

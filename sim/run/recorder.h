@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "exploration/explorer.h"
+#include "mapping/mapper.h"
 #include "math/pose.h"
 #include "messages/events.h"
 
@@ -39,11 +41,15 @@ class Recorder {
   void estimate(Stamp stamp, const Pose& X_OB);
   void event(const Event& event);
   void flight(const FlightRow& row);
+  /// Every candidate of a decision with its terms, to decisions.csv.
+  void decision(const Decision& decision);
   /// Makes what was recorded so far readable by others.
   void flush();
 
   /// cloud.pcd, replaced atomically. May be called from a job.
   void write_cloud(const std::vector<Vec3f>& points_O) const;
+  /// map.bt, map2d.pgm and map2d.yaml.
+  void write_maps(const Mapper& mapper) const;
   /// A whole file of the folder, replaced atomically.
   void write_file(const std::string& name, const std::string& content);
   /// Flushes everything, then writes summary.json.
@@ -61,6 +67,7 @@ class Recorder {
   File estimate_;
   File events_;
   File flight_;
+  File decisions_;
 };
 
 }  // namespace arex::sim

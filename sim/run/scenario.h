@@ -8,6 +8,8 @@
 #include "autopilot/autopilot_config.h"
 #include "config/config.h"
 #include "physics/physics_config.h"
+#include "scoring/coverage.h"
+#include "scoring/map_error.h"
 #include "sensors/d430.h"
 #include "sensors/imu.h"
 #include "sensors/mid360.h"
@@ -32,6 +34,22 @@ struct DeviceConfig {
   }
 };
 
+/// What the truth is compared with. Coverage is scored on explorations only.
+struct ScoringConfig {
+  double low_m = -3;  ///< in O: the vehicle could reach what lies between
+  double high_m = 3;
+  CoverageConfig coverage;
+  MapErrorConfig map;
+
+  void fields(auto& f) {
+    f("low_m", low_m, "lower edge of the space that counts as reachable, z in O");
+    f("high_m", high_m, "upper edge of that space");
+    f("coverage", coverage, "coverage of the reachable, visible truth");
+    f("map", map, "distance of the map from the true surfaces");
+    f.check(low_m < high_m, "low_m < high_m");
+  }
+};
+
 /// One mission: the world, the vehicle, its sensors and its flight software. A scenario file lists
 /// what differs from the defaults.
 struct ScenarioConfig {
@@ -44,6 +62,7 @@ struct ScenarioConfig {
   DeviceConfig devices;
   AutopilotConfig autopilot;
   StackConfig stack;
+  ScoringConfig scoring;
 
   void fields(auto& f) {
     f("seed", seed, "of everything random");
@@ -55,6 +74,7 @@ struct ScenarioConfig {
     f("devices", devices, "which run, and how long they take");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
+    f("scoring", scoring, "what the truth is compared with");
     f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
             "devices.lidar true, or odometry.source mocap");
   }

@@ -11,8 +11,9 @@ namespace {
 constexpr Stamp kTick = kNanosecondsPerTick;
 constexpr Stamp kStatusPeriod = 5 * kTick;  // 200 Hz: what the autopilot tells, the battery, mocap
 constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leaves it
-constexpr Stamp kFlushPeriod = 1000 * kTick;    // what a killed run leaves
-constexpr Stamp kLidarPart = 20 * kTick;        // a frame is cast in parts while it is fired
+constexpr Stamp kCoveragePeriod = 1000 * kTick;
+constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
+constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
 
 std::vector<worlds::CollisionShape> airframe_without_lidar(const Airframe& airframe) {
   std::vector<worlds::CollisionShape> shapes;
@@ -54,7 +55,14 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       jobs_(threads),
       lidar_lane_(jobs_.add_lane("lidar")),
       depth_lane_(jobs_.add_lane("depth")),
-      stack_(config_.stack, jobs_, config_.seed) {}
+      stack_(config_.stack, jobs_, config_.seed) {
+  if (config_.stack.mission.kind != MissionConfig::Kind::kExplore) return;
+  const ExplorationBounds& bounds = config_.stack.exploration.explorer.bounds;
+  const worlds::Bounds box{{bounds.low_m.x(), bounds.low_m.y(), config_.scoring.low_m},
+                           {bounds.high_m.x(), bounds.high_m.y(), config_.scoring.high_m}};
+  coverage_ = std::make_unique<CoverageScorer>(config_.scoring.coverage, world_, scene_,
+                                               scorer_.X_WO(), box, config_.stack.vehicle.radius_m);
+}
 
 Simulation::~Simulation() { jobs_.stop(); }
 
@@ -196,8 +204,27 @@ void Simulation::record() {
       bag_->truth(now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB, truth.w_WB_B);
     }
   }
+  for (const Decision& decision : stack_.take_decisions()) {
+    if (recorder_) recorder_->decision(decision);
+  }
+  if (coverage_ && now_ % kCoveragePeriod == 0) score_coverage();
   if (recorder_ && now_ % kFlushPeriod == 0) recorder_->flush();
   if (recorder_ && now_ > 0 && now_ % kCloudPeriod == 0) write_cloud();
+}
+
+void Simulation::score_coverage() {
+  const Perception& perception = stack_.perception();
+  coverage_->add_position(physics_.truth().X_WB.p);
+  if (!perception.map_2d()) return;
+  jobs_.start(perception.cloud_lane(), now_, 0,
+              [this, stamp = now_, map = perception.map_2d(), X_WO = scorer_.X_WO(),
+               distance = scorer_.distance_m(),
+               volume = perception.known_volume_m3()]() -> JobQueue::Delivery {
+                const auto points = stack_.perception().cloud().points(covered_points_);
+                covered_points_ += points.size();
+                coverage_->update(stamp, distance, *map, volume, points, X_WO);
+                return [this, row = coverage_->latest()] { area_fraction_ = row.area_fraction; };
+              });
 }
 
 void Simulation::write_cloud() {
@@ -258,7 +285,14 @@ FlightResult Simulation::finish() {
     if (recorder_) recorder_->write_cloud(cloud);
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
     // odometry's.
-    result.map = score_map(cloud, align_rigid(result.flight.poses), world_, scene_);
+    result.map =
+        score_map(cloud, align_rigid(result.flight.poses), world_, scene_, config_.scoring.map);
+  }
+  if (coverage_) result.coverage = coverage_->result();
+  result.plans = stack_.navigator().machine().plans();
+  result.plan_failures = stack_.navigator().machine().failures();
+  if (recorder_ && config_.stack.mapping.enabled) {
+    recorder_->write_maps(stack_.perception().mapper());
   }
   result.battery = physics_.battery();
   if (camera_) result.renderer = camera_->renderer_name();

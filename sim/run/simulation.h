@@ -34,7 +34,10 @@ struct FlightResult {
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;
-  std::optional<MapScore> map;  ///< nothing without a map
+  std::optional<MapScore> map;             ///< nothing without a map
+  std::optional<CoverageResult> coverage;  ///< of explorations
+  int plans = 0;
+  int plan_failures = 0;
   BatteryState battery;
   std::string renderer;  ///< of the depth frames; empty if none was read
   std::vector<TimingRow> timing;
@@ -60,6 +63,8 @@ class Simulation {
   /// Ends the flight from outside.
   void interrupt(const std::string& reason);
 
+  /// Area explored so far, of what can be reached; 0 where it is not scored.
+  [[nodiscard]] double area_fraction() const { return area_fraction_; }
   [[nodiscard]] Stamp now() const { return now_; }
   [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
   [[nodiscard]] const Stack& stack() const { return stack_; }
@@ -77,6 +82,7 @@ class Simulation {
   void judge();
   void end(Outcome outcome, const std::string& reason);
   void write_cloud();
+  void score_coverage();
 
   struct Timers {
     StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
@@ -106,6 +112,9 @@ class Simulation {
   TrajectoryHash hash_;
   TrajectoryHash sensor_hash_;
   FlightScorer scorer_;
+  std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
+  std::size_t covered_points_ = 0;            ///< of the cloud, already scored
+  double area_fraction_ = 0;
   int collisions_ = 0;
   Timers timers_;
 

@@ -50,6 +50,44 @@ ordered_json map_json(const std::optional<MapScore>& score) {
           {"scored", score->scored},        {"foliage", score->foliage}};
 }
 
+ordered_json or_null(double value) {
+  return std::isfinite(value) ? ordered_json(rounded(value)) : ordered_json(nullptr);
+}
+
+ordered_json coverage_json(const std::optional<CoverageResult>& coverage) {
+  if (!coverage) return nullptr;
+  ordered_json classes = ordered_json::object();
+  for (std::size_t i = 0; i < coverage->classes.size(); ++i) {
+    const ClassCoverage& c = coverage->classes[i];
+    if (c.visible == 0) continue;
+    classes[std::string(worlds::kSurfaceClassNames[i])] =
+        rounded(static_cast<double>(c.mapped) / static_cast<double>(c.visible));
+  }
+  return {{"area_fraction", rounded(coverage->area_fraction)},
+          {"surface_fraction", rounded(coverage->surface_fraction)},
+          {"volume_m3", rounded(coverage->volume_m3)},
+          {"t50_s", or_null(coverage->t50_s)},
+          {"t90_s", or_null(coverage->t90_s)},
+          {"t95_s", or_null(coverage->t95_s)},
+          {"revisit_ratio", rounded(coverage->revisit_ratio)},
+          {"heading_change_radpm", rounded(coverage->heading_change_radpm)},
+          {"reachable_area_m2", rounded(coverage->area_m2)},
+          {"surface_samples", coverage->surface_samples},
+          {"surface_fraction_by_class", classes}};
+}
+
+ordered_json planner_json(const FlightResult& result) {
+  if (result.plans == 0) return nullptr;
+  for (const TimingRow& row : result.timing) {
+    if (row.module != "planner") continue;
+    return {{"replans", result.plans},
+            {"median_ms", rounded(row.median_ms)},
+            {"p99_ms", rounded(row.p99_ms)},
+            {"failures", result.plan_failures}};
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 ordered_json summarise(const Scenario& scenario, const FlightResult& result, const HostTime& host) {
@@ -67,10 +105,10 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   json["sensor_hash"] = result.sensor_hash;
   json["distance_m"] = rounded(result.flight.distance_m);
   json["targets"] = targets_json(result);
-  json["coverage"] = nullptr;
+  json["coverage"] = coverage_json(result.coverage);
   json["map"] = map_json(result.map);
   json["odometry"] = odometry_json(scenario, result);
-  json["planner"] = nullptr;
+  json["planner"] = planner_json(result);
   json["tracking"] = {{"rmse_m", rounded(result.flight.tracking_rmse_m)},
                       {"landing_error_m", rounded(result.flight.landing_error_m)}};
   json["clearance"] = {{"min_m", rounded(result.flight.clearance.min_m)},

@@ -9,7 +9,7 @@
 namespace arex {
 
 struct PointCloudMapConfig {
-  double voxel_m = 0.05;
+  double voxel_m = 0.08;
   int max_points = 3000000;
 
   void fields(auto& f) {

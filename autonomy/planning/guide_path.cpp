@@ -17,7 +17,7 @@ constexpr double kBlocked = -1.0;
 class CostMap {
  public:
   CostMap(const OccupancyMap2D& map, const Vec2& from, const Vec2& to, const GuideConfig& config)
-      : map_(map), config_(config) {
+      : map_(map) {
     const Eigen::Vector2i a = map.cell_of(from), b = map.cell_of(to);
     const Eigen::Vector2i end(map.width - 1, map.height - 1);
     low_ = a.cwiseMin(b).cwiseMin(Eigen::Vector2i::Zero()).array() - kMargin;
@@ -113,7 +113,6 @@ class CostMap {
   }
 
   const OccupancyMap2D& map_;
-  const GuideConfig& config_;
   Eigen::Vector2i low_, size_;
   std::vector<double> distance_, cost_;
 };

@@ -172,7 +172,7 @@ UniformBspline time_path(std::span<const Vec3> path, const MotionState& start,
   const auto head = UniformBspline::boundary(start, knot_span_s);
   std::vector<Vec3> q(head.begin(), head.end());
   const Stations stations = make_stations(path);
-  const Vec3 goal = path.back();
+  const Vec3& goal = path.back();
   if (stations.points.size() > 2) {
     const double speed = start.v.norm();
     const Vec3 along = speed > 1e-6 ? Vec3(start.v / speed)

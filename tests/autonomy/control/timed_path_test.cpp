@@ -14,7 +14,7 @@ namespace {
 TEST(SCurve, ReachesTheDistanceAtRestWithinItsLimits) {
   RandomStream random(1, "s_curve");
   for (int i = 0; i < 400; ++i) {
-    const MotionLimits limits{random.uniform(0.1, 5), random.uniform(0.1, 6),
+    const SCurveLimits limits{random.uniform(0.1, 5), random.uniform(0.1, 6),
                               random.uniform(0.1, 20)};
     const double distance = std::pow(10, random.uniform(-4, 2));
     const SCurve curve(distance, limits);
@@ -43,7 +43,7 @@ TEST(SCurve, IsTheFastestOfItsKind) {
 
 TEST(SCurve, IsContinuousInTheDistance) {
   // Across the switches between the cases the duration must not jump.
-  const MotionLimits limits{1.5, 1.5, 3};
+  const SCurveLimits limits{1.5, 1.5, 3};
   double before = 0;
   for (double d = 0.0005; d < 4; d += 0.0005) {
     const double duration = SCurve(d, limits).duration_s();

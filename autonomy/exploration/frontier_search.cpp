@@ -58,6 +58,7 @@ Frontier describe(const ExplorationSpace& space, std::vector<Eigen::Vector2i> ce
   Frontier frontier;
   frontier.length_m = space.map().resolution * static_cast<double>(cells.size());
   std::vector<Neighbour> neighbours;
+  neighbours.reserve(cells.size());
   for (const Eigen::Vector2i& cell : cells) {
     neighbours.push_back(best_unknown_neighbour(space, cell).value_or(Neighbour{}));
   }

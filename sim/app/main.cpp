@@ -14,7 +14,8 @@ void add_scenario_options(CLI::App& command, ScenarioArguments& arguments, bool 
   if (file_required) file->required();
   command.add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
-  command.add_option("--seed", arguments.seed, "the seed of everything random");
+  command.add_option("--seed", arguments.seed, "the seed of everything random")
+      ->check(CLI::NonNegativeNumber);
 }
 
 void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
@@ -33,7 +34,8 @@ void add_world(CLI::App& app, WorldArguments& arguments, int& exit_code) {
   command->add_option("recipe", arguments.file, "world recipe, or a scenario")->required();
   command->add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
-  command->add_option("--seed", arguments.seed, "the seed of the world");
+  command->add_option("--seed", arguments.seed, "the seed of the world")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--out", arguments.out, "folder to write")->required();
   command->callback([&] { exit_code = world(arguments); });
 }

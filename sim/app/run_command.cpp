@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -6,6 +8,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 
 #include "app/commands.h"
 #include "run/recorder.h"
@@ -31,9 +34,9 @@ double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC
 /// The line that a person watches.
 class ProgressLine {
  public:
-  explicit ProgressLine(bool shown) : shown_(shown) {}
+  explicit ProgressLine(bool shown) : shown_(shown), on_terminal_(isatty(STDERR_FILENO) != 0) {}
   ~ProgressLine() {
-    if (drawn_) std::fputc('\n', stderr);
+    if (drawn_ && on_terminal_) std::fputc('\n', stderr);
   }
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -42,18 +45,21 @@ class ProgressLine {
     if (!shown_) return;
     const double wall = seconds_since(begin_);
     if (wall < next_) return;
-    next_ = wall + 0.25;
+    next_ = wall + (on_terminal_ ? 0.25 : 10.0);  // a log wants a line now and then
     const double time = to_seconds(simulation.now());
     const Mission& mission = simulation.stack().mission();
     const auto state = kMissionStateNames[static_cast<std::size_t>(mission.state())];
-    std::fprintf(stderr, "\r%7.1f s  %-10.*s  targets %2zu  explored %3.0f %%  %5.2fx real time ",
+    if (on_terminal_) std::fputc('\r', stderr);
+    std::fprintf(stderr, "%7.1f s  %-10.*s  targets %2zu  explored %3.0f %%  %5.2fx real time ",
                  time, static_cast<int>(state.size()), state.data(), mission.targets().size(),
                  100 * simulation.area_fraction(), time / wall);
+    if (!on_terminal_) std::fputc('\n', stderr);
     drawn_ = true;
   }
 
  private:
   bool shown_;
+  bool on_terminal_;
   bool drawn_ = false;
   double next_ = 0;
   Clock::time_point begin_ = Clock::now();
@@ -86,15 +92,18 @@ int run(const RunArguments& arguments) {
       arguments.scenario.file, arguments.scenario.overrides, arguments.scenario.seed);
   const std::filesystem::path folder = run_folder(arguments, scenario);
 
-  // The world is built before the folder: a bad recipe writes nothing.
+  // The world is built before anything is written: a bad recipe leaves nothing.
   sim::Simulation simulation(scenario, arguments.threads);
-  sim::Recorder recorder(folder, scenario.resolved_yaml());
-  simulation.record_to(recorder);
-
   std::optional<sim::BagWriter> bag;
-  if (!arguments.bag.empty()) {
-    simulation.record_to(bag.emplace(arguments.bag, scenario.config.stack.vehicle));
+  std::optional<sim::Recorder> recorder;
+  try {
+    if (!arguments.bag.empty()) bag.emplace(arguments.bag, scenario.config.stack.vehicle);
+    recorder.emplace(folder, scenario.resolved_yaml());
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(error.what());  // a path that cannot be written is bad input
   }
+  simulation.record_to(*recorder);
+  if (bag) simulation.record_to(*bag);
 
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
@@ -107,12 +116,12 @@ int run(const RunArguments& arguments) {
   }
   const sim::FlightResult result = simulation.finish();
   if (bag) bag->close();
-  recorder.write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
+  recorder->write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
   if (result.coverage) {
-    recorder.write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
+    recorder->write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
   }
-  recorder.write_file("timing.csv", sim::timing_csv(result.timing));
-  recorder.write_summary(
+  recorder->write_file("timing.csv", sim::timing_csv(result.timing));
+  recorder->write_summary(
       sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}));
   if (!arguments.quiet) print_result(result, folder);
   return exit_code_of(result.outcome);

@@ -95,6 +95,8 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   expect_refused("seed: 1\n", {"--set", "misson.max_time_s=1"}, "did you mean 'mission'?");
   expect_refused("seed: 1\n", {"--set", "seed"}, "expected key=value");
   expect_refused("seed: 1\n", {"--threads", "none"}, "--threads");
+  expect_refused("seed: 1\n", {"--seed", "-1"}, "--seed");
+  expect_refused("seed: 1\n", {"--bag", "/does/not/exist/x.bag"}, "/does/not/exist/x.bag");
   const Result missing = run({"run", "/does/not/exist.yaml"});
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_EQ(missing.err, "/does/not/exist.yaml:1: cannot be read, expected a YAML file\n");

@@ -23,7 +23,10 @@ find_package(Threads REQUIRED)
 
 add_library(arex_options INTERFACE)
 # x86-64-v3 for speed on every AVX2 host; no contraction and no fast-math, so that results are the
-# same on all of them. EIGEN_MAX_ALIGN_BYTES=16 keeps Eigen's layout that of Debian's PCL.
+# same on all of them. EIGEN_MAX_ALIGN_BYTES=16 keeps the layout of Eigen's fixed-size types that of
+# Debian's PCL. Heap blocks differ still: with AVX, Eigen's aligned_malloc pads them to 32 bytes,
+# PCL's does not. No dynamic Eigen matrix and no cloud may be allocated on one side and freed on
+# the other.
 target_compile_options(arex_options INTERFACE
   -march=x86-64-v3 -ffp-contract=off -fpch-preprocess
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion

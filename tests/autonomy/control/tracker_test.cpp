@@ -120,7 +120,8 @@ TEST(Tracker, ObserverIsBoundedAndStandsStillOnTheGround) {
   const TrackerConfig config;
   Tracker tracker(config, {});
   TrajectorySetpoint setpoint;
-  for (int i = 0; i < 1000; ++i) (void)tracker.update(setpoint, at(Vec3::Zero(), Vec3::Zero()), false);
+  for (int i = 0; i < 1000; ++i)
+    (void)tracker.update(setpoint, at(Vec3::Zero(), Vec3::Zero()), false);
   EXPECT_EQ(tracker.disturbance_n().norm(), 0);
   for (int i = 0; i < 3000; ++i) {  // held fast while asked to climb
     setpoint.p_OB.z() = 5;

@@ -158,4 +158,25 @@ std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start, double tr
   return {};
 }
 
+GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double reach_m,
+                                 double true_radius_m) {
+  cells_.assign(grid.cells, grid.cells + grid.size.cast<std::ptrdiff_t>().prod());
+  GridView shrunk = grid;
+  shrunk.cells = cells_.data();
+  const Eigen::Vector3i centre = grid.cell_of(p);
+  if (!grid.contains(centre)) return shrunk;
+  const int radius = static_cast<int>(std::ceil(reach_m / grid.resolution_m));
+  const double least = true_radius_m / grid.resolution_m + 0.5;  // from centre to centre
+  const ClearanceCube cube(grid, centre, radius, static_cast<int>(std::ceil(least)) + 2);
+  const double here = cube.clearance(cube.index(Eigen::Vector3i::Zero()));
+  const double kept = std::max(std::min(least, here), here - 1.0);
+  for (int i = 0; i < cube.count(); ++i) {
+    const Eigen::Vector3i cell = centre + cube.offset(i);
+    if (!grid.contains(cell) || cube.clearance(i) < kept) continue;
+    std::uint8_t& flags = cells_[grid.index(cell)];
+    flags = static_cast<std::uint8_t>(flags & ~GridView::kInflated);
+  }
+  return shrunk;
+}
+
 }  // namespace arex

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -23,5 +24,20 @@ namespace arex {
 /// a free cell's centre; empty if there is none within `max_distance_m`.
 [[nodiscard]] std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start,
                                             double true_radius_m, double max_distance_m);
+
+/// The grid as a vehicle that is inside the inflation sees it: points seen since it planned, or one
+/// cell of noise, have grown over it, and it flies on from there. Within `reach_m` of it (a cube)
+/// the inflation is shrunk to the clearance that the vehicle has, less one cell for the way that a
+/// moving vehicle cannot help going on, and never to less than the true radius or, where it is
+/// nearer to an obstacle already, than it has.
+class ShrunkInflation {
+ public:
+  /// A copy of the grid; valid until the next call.
+  [[nodiscard]] GridView around(const GridView& grid, const Vec3& p, double reach_m,
+                                double true_radius_m);
+
+ private:
+  std::vector<std::uint8_t> cells_;
+};
 
 }  // namespace arex

@@ -434,9 +434,26 @@ void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& 
 }
 
 PlanResult LocalPlanner::plan(const GridView& grid, const PlanRequest& request) {
+  if (!is_blocked(grid, request.start.p)) return plan_from_free(grid, request);
+  if (clearance(grid, request.start.p, config_.true_radius_m) < config_.true_radius_m) {
+    PlanResult result;
+    result.status = PlanStatus::kStartInInflation;
+    result.goal = request.goal;
+    return result;
+  }
+  const double reach =
+      config_.leave_distance_m +
+      stopping_distance(request.start.v.norm(), config_.max_acceleration_mps2, 0.0);
+  PlanResult result =
+      plan_from_free(shrunk_.around(grid, request.start.p, reach, config_.true_radius_m), request);
+  result.diagnostics.start_inflated = true;
+  return result;
+}
+
+PlanResult LocalPlanner::plan_from_free(const GridView& grid, const PlanRequest& request) {
   PlanResult result;
   result.goal = request.goal;
-  if (is_blocked(grid, request.start.p)) {
+  if (is_blocked(grid, request.start.p)) {  // outside the grid, or in an obstacle
     result.status = PlanStatus::kStartInInflation;
     return result;
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mapping/grid_view.h"
+#include "planning/free_space.h"
 #include "planning/grid_astar.h"
 #include "planning/local_planner_config.h"
 #include "planning/spline_cost.h"
@@ -58,6 +59,7 @@ struct PlanDiagnostics {
   bool retimed = false;      ///< the path was timed anew
   bool slowed = false;       ///< for unknown space
   bool goal_shifted = false;
+  bool start_inflated = false;  ///< the inflation was shrunk about the start
 };
 
 struct [[nodiscard]] PlanResult {
@@ -80,7 +82,8 @@ class LocalPlanner {
   explicit LocalPlanner(const LocalPlannerConfig& config) : config_(config) {}
 
   /// Plans from a state to rest at the goal. Unknown cells count as free here; with
-  /// stop_in_known_space the speed is such that the vehicle can stop before them.
+  /// stop_in_known_space the speed is such that the vehicle can stop before them. A start inside
+  /// the inflation, but no nearer to an obstacle than the true radius, is left on the way.
   PlanResult plan(const GridView& grid, const PlanRequest& request);
 
   /// From inside the inflation: out of it, with the inflation shrunk to the true radius, slowly,
@@ -90,6 +93,7 @@ class LocalPlanner {
   [[nodiscard]] const LocalPlannerConfig& config() const { return config_; }
 
  private:
+  PlanResult plan_from_free(const GridView& grid, const PlanRequest& request);
   [[nodiscard]] std::vector<Vec3> polynomial_path(const PlanRequest& request) const;
   [[nodiscard]] std::vector<Vec3> previous_path(const PlanRequest& request) const;
   [[nodiscard]] std::vector<Vec3> random_path(const PlanRequest& request, int index) const;
@@ -138,6 +142,7 @@ class LocalPlanner {
 
   LocalPlannerConfig config_;
   GridAstar astar_;
+  ShrunkInflation shrunk_;
 };
 
 }  // namespace arex

@@ -44,6 +44,7 @@ struct LocalPlannerConfig {
 
   double true_radius_m = 0.3;  ///< the vehicle's (models/arex/README.md)
   double max_goal_shift_m = 1.5;
+  double leave_distance_m = 0.3;  ///< with the stopping distance: where the inflation is shrunk
   double escape_distance_m = 1.5;
   double escape_speed_mps = 0.5;
   bool stop_in_known_space = true;
@@ -86,6 +87,8 @@ struct LocalPlannerConfig {
     f("timing_attempts", timing_attempts, "tries to time a path, each slower");
     f("true_radius_m", true_radius_m, "of the vehicle: inflation shrinks to it for an escape");
     f("max_goal_shift_m", max_goal_shift_m, "of a goal inside the inflation");
+    f("leave_distance_m", leave_distance_m,
+      "and the stopping distance: about a start in the inflation, shrunk to the room it has");
     f("escape_distance_m", escape_distance_m, "furthest way out of the inflation");
     f("escape_speed_mps", escape_speed_mps, "speed of an escape");
     f("stop_in_known_space", stop_in_known_space, "slow down before unknown cells");
@@ -98,6 +101,7 @@ struct LocalPlannerConfig {
     f.check(safe_distance_m > 0, "safe_distance_m > 0");
     f.check(feasibility_threshold < feasibility_junction,
             "feasibility_threshold < feasibility_junction");
+    f.check(leave_distance_m >= 0, "leave_distance_m >= 0");
     f.check(timing_knot_span_s > 0, "timing_knot_span_s > 0");
   }
 };

@@ -229,10 +229,13 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
 }
 
 /// When the trajectory next meets blocked cells. Inflation that has grown over the vehicle does not
-/// count if the trajectory leaves it soon and the true radius stays free until then: stopping
-/// inside would be worse.
+/// count if the trajectory leaves it soon and comes, until then, neither nearer than the true
+/// radius nor nearer than it is by more than a cell: stopping inside would be worse.
 std::optional<double> ReplanMachine::next_collision(const GridView& grid, double t_s) const {
-  const double radius = planner_.config().true_radius_m;
+  const double radius = std::min(planner_.config().true_radius_m,
+                                 clearance(grid, current_.spline.position(t_s),
+                                           planner_.config().true_radius_m + grid.resolution_m) -
+                                     grid.resolution_m);
   for (const TimeInterval& stretch : find_collisions(grid, current_.spline, t_s)) {
     bool leaves = stretch.begin_s <= t_s && stretch.end_s < t_s + config_.emergency_time_s;
     for (double t = stretch.begin_s; leaves && t <= stretch.end_s; t += kClearanceStep_s) {
@@ -381,7 +384,7 @@ void ReplanMachine::give_up(StuckCause cause, Stamp now) {
   report(PlannerEventKind::kAskForTarget, now, cause);
 }
 
-TrajectorySetpoint ReplanMachine::setpoint(Stamp now) {
+TrajectorySetpoint ReplanMachine::setpoint(Stamp now, double force_lag_s) {
   advance(now);
   TrajectorySetpoint setpoint;
   if (current_.spline.empty()) return setpoint;
@@ -396,7 +399,8 @@ TrajectorySetpoint ReplanMachine::setpoint(Stamp now) {
   last_setpoint_ = now;
   setpoint.p_OB = state.p;
   setpoint.v_OB = state.v;
-  setpoint.a_OB = state.a;
+  const Stamp acts = now + from_seconds(force_lag_s);
+  setpoint.a_OB = (next_ && acts >= next_->takes_over ? *next_ : current_).state(acts).a;
   setpoint.yaw_rad = heading_.yaw_rad;
   setpoint.yaw_rate_radps = heading_.rate_radps;
   return setpoint;

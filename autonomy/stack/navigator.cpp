@@ -2,8 +2,10 @@
 
 namespace arex {
 
-Navigator::Navigator(const PlanningConfig& config, JobQueue& jobs, std::uint64_t seed)
+Navigator::Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs,
+                     std::uint64_t seed)
     : config_(config),
+      force_lag_s_(force_lag_s),
       jobs_(jobs),
       planner_lane_(jobs.add_lane("planner")),
       guide_lane_(jobs.add_lane("guide")),
@@ -69,7 +71,7 @@ TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& 
   if (has_target_ && progress_ == MotionProgress::kUnderWay && machine_.needs_target()) {
     progress_ = MotionProgress::kFailed;
   }
-  return machine_.setpoint(now);
+  return machine_.setpoint(now, force_lag_s_);
 }
 
 }  // namespace arex

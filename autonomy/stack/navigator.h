@@ -18,7 +18,8 @@ namespace arex {
 /// the replanning machine along it.
 class Navigator {
  public:
-  Navigator(const PlanningConfig& config, JobQueue& jobs, std::uint64_t seed);
+  /// @param force_lag_s from the controller's demand to the real force
+  Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs, std::uint64_t seed);
 
   /// Takes the vehicle over at rest at a setpoint of somebody else's.
   void take_over(const TrajectorySetpoint& from, Stamp now);
@@ -43,6 +44,7 @@ class Navigator {
                    Stamp now);
 
   PlanningConfig config_;
+  double force_lag_s_;
   JobQueue& jobs_;
   JobQueue::Lane planner_lane_;
   JobQueue::Lane guide_lane_;

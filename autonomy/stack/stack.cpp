@@ -16,7 +16,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       mission_(config.mission,
                [this](EventKind kind, const std::string& detail) { report(kind, detail); }),
       legs_(config.path, config.caution),
-      navigator_(config.planning, jobs, seed),
+      navigator_(config.planning, config.control.attitude_lag_s, jobs, seed),
       tracker_(config.control, config.vehicle),
       control_period_(from_seconds(1 / config.control.rate_hz)) {}
 

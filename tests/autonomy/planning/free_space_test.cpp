@@ -72,5 +72,38 @@ TEST(FreeSpace, NoEscapeThroughGapsNarrowerThanTheVehicle) {
   EXPECT_FALSE(escape_path(grid.view(), {3.05, 3.05, 1.0}, 0.05, 2.0).empty());
 }
 
+TEST(FreeSpace, InflationShrinksToTheRoomThereIs) {
+  RandomStream random(2, "shrunk");
+  constexpr double kTrueRadius = 0.3, kReach = 0.8;
+  int freed = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    test::TestGrid grid(40, 40, 30);
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3i cell(random.uniform_int(0, 39), random.uniform_int(0, 39),
+                                 random.uniform_int(0, 29));
+      grid.add_obstacle(cell, cell, 5);
+    }
+    const Vec3 p = test::random_point(random, 0.5, 2.5);
+    const GridView before = grid.view();
+    ShrunkInflation shrunk;
+    const GridView after = shrunk.around(before, p, kReach, kTrueRadius);
+    EXPECT_EQ(is_blocked(after, p), (before.at(p) & GridView::kOccupied) != 0);
+    const double here = clearance(before, p, 1.0);
+    for (int i = 0; i < 40 * 40 * 30; ++i) {
+      const Eigen::Vector3i cell(i / 40 % 40, i % 40, i / 1600);
+      const std::uint8_t was = before.cells[before.index(cell)];
+      const std::uint8_t is = after.cells[after.index(cell)];
+      if (was == is) continue;
+      ++freed;
+      const Vec3 centre = before.centre_of(cell);
+      EXPECT_EQ(was & ~GridView::kInflated, is);
+      EXPECT_LE((centre - p).cwiseAbs().maxCoeff(), kReach + 0.1);
+      // Clearances here are to boxes and from any point of the cell; the planner's between centres.
+      EXPECT_GE(clearance(before, centre, 1.0), std::min(here - 0.1, kTrueRadius) - 0.1);
+    }
+  }
+  EXPECT_GT(freed, 100);
+}
+
 }  // namespace
 }  // namespace arex

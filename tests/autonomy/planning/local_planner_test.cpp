@@ -121,7 +121,7 @@ TEST(LocalPlanner, NamesWhyItFails) {
   test::TestGrid grid(100, 100, 20);
   grid.add_obstacle({20, 20, 0}, {24, 24, 19}, 4);
   LocalPlanner planner((LocalPlannerConfig()));
-  PlanRequest request{{{1.7, 1.7, 1.0}, Vec3::Zero(), Vec3::Zero()}, {8.0, 8.0, 1.0}};
+  PlanRequest request{{{1.85, 1.85, 1.0}, Vec3::Zero(), Vec3::Zero()}, {8.0, 8.0, 1.0}};
   EXPECT_EQ(planner.plan(grid.view(), request).status, PlanStatus::kStartInInflation);
 
   request.start.p = {1.0, 8.0, 1.0};

@@ -166,7 +166,7 @@ TEST(ReplanMachine, EscapesFromAnInflationThatGrowsOverIt) {
   ReplanMachine machine = make_machine();
   Flight flight(machine, {3.05, 5.05, 1.05});
   flight.step(grid.view());
-  grid.add_obstacle({35, 48, 0}, {37, 53, 19}, 6);  // 0.45 m ahead; its inflation holds the vehicle
+  grid.add_obstacle({33, 48, 0}, {35, 53, 19}, 6);  // 0.25 m ahead: nearer than the true radius
   ASSERT_TRUE(grid.view().inflated(flight.last_.p_OB));
   machine.set_target({8.0, 5.05, 1.05}, {}, flight.now_);
   flight.run(grid.view(), 60);
@@ -188,6 +188,44 @@ TEST(ReplanMachine, FliesOnOutOfAnInflationThatGrazesIt) {
   flight.run(grid.view(), 60);
   EXPECT_EQ(flight.count(PlannerEventKind::kEmergencyStop), 0);
   EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+}
+
+TEST(ReplanMachine, PlansOnFromWithinTheInflationWithoutComingNearer) {
+  for (const int aside : {3, 4}) {  // whole cells between the path's and the obstacle's
+    test::TestGrid grid(160, 80, 20);
+    ReplanMachine machine = make_machine();
+    Flight flight(machine, {1.05, 4.05, 1.05});
+    flight.step(grid.view());
+    machine.set_target({14.0, 4.05, 1.05}, {}, flight.now_);
+    while (flight.last_.p_OB.x() < 5.0) flight.step(grid.view());
+    const int x = static_cast<int>(flight.last_.p_OB.x() / 0.1);
+    // A hedge along the way: the trajectory in force would stay inside its inflation for long.
+    grid.add_obstacle({x - 2, 41 + aside, 0}, {x + 60, 43 + aside, 19}, 5);
+    ASSERT_TRUE(grid.view().inflated(flight.last_.p_OB));
+    double nearest = 1e9;
+    for (int i = 0; i < 2000 && machine.has_target(); ++i) {
+      flight.step(grid.view());
+      nearest = std::min(nearest, clearance(grid.view(), flight.last_.p_OB, 1.0));
+    }
+    EXPECT_EQ(flight.count(PlannerEventKind::kEmergencyStop), 0) << aside;
+    EXPECT_EQ(flight.count(PlannerEventKind::kPlanFailed), 0) << aside;
+    EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1) << aside;
+    EXPECT_GE(nearest, LocalPlannerConfig().true_radius_m - 1e-3) << aside;
+  }
+}
+
+TEST(ReplanMachine, DemandsTheAccelerationOfTheMomentAtWhichItActs) {
+  const test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {1.05, 4.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({14.0, 4.05, 1.05}, {}, flight.now_);
+  while (flight.last_.v_OB.norm() < 0.5) flight.step(grid.view());
+  const double t = to_seconds(flight.now_ - machine.trajectory_start());
+  const TrajectorySetpoint ahead = machine.setpoint(flight.now_, 0.15);
+  EXPECT_EQ(ahead.p_OB, machine.trajectory().position(t));
+  EXPECT_LT((ahead.a_OB - machine.trajectory().state(t + 0.15).a).norm(), 1e-9);
+  EXPECT_GT((ahead.a_OB - machine.trajectory().state(t).a).norm(), 1e-3);
 }
 
 TEST(ReplanMachine, HoldsWhenOdometryIsLost) {

@@ -117,8 +117,8 @@ class Physics::Impl {
          {mjWARN_CONTACTFULL, mjWARN_CNSTRFULL, mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
       if (data_->warning[warning].number != 0) {
         throw std::runtime_error(
-            "physics failed at " + std::to_string(to_seconds(truth_.stamp)) + " s: " +
-            mju_warningText(warning, static_cast<size_t>(data_->warning[warning].lastinfo)));
+            "physics failed at " + std::to_string(to_seconds(truth_.stamp)) +
+            " s: " + mju_warningText(warning, data_->warning[warning].lastinfo));
       }
     }
   }

@@ -12,9 +12,8 @@
 namespace arex {
 namespace {
 
-constexpr double kPathSpacing = 0.02;   ///< m between points of an initial path
-constexpr double kWorthRetiming = 0.9;  ///< retime when that takes less than this share of the time
-constexpr double kSlower = 0.8;         ///< between attempts to time a path
+constexpr double kPathSpacing = 0.02;     ///< m between points of an initial path
+constexpr double kSlower = 0.8;           ///< between attempts to time a path
 constexpr double kCollisionGrowth = 2.0;  ///< of lambda_c per rebound (EGO-Planner)
 /// Corner roundings (m) tried for a path, from fast to close.
 constexpr double kRoundings[] = {0.4, 0.25, 0.12, 0.05, 0.02};

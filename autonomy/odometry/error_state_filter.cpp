@@ -58,10 +58,12 @@ void ErrorStateFilter::predict(const ImuInterval& imu) {
   const double dt = imu.dt_s();
   const PropagationJacobians jacobians = propagation_jacobians(x_, imu);
   Eigen::Matrix<double, kNoiseDim, 1> Q;
-  const double limit = noise_.gyro_range_radps;
+  const Vec3 rate = imu.mean_gyro() - x_.b_g;
   for (int i = 0; i < 3; ++i) {
-    const bool clipped = std::abs(imu.gyro_begin[i]) >= limit || std::abs(imu.gyro_end[i]) >= limit;
-    const double gyro = clipped ? noise_.clipped_gyro_noise_density : noise_.gyro_noise_density;
+    const double gyro =
+        imu.gyro_clipped[static_cast<std::size_t>(i)]
+            ? noise_.clipped_gyro_noise_density
+            : std::hypot(noise_.gyro_noise_density, noise_.gyro_scale_noise_density * rate.norm());
     Q[i] = gyro * gyro / dt;
     Q[3 + i] = noise_.accel_noise_density * noise_.accel_noise_density / dt;
     Q[6 + i] = noise_.gyro_walk_density * noise_.gyro_walk_density / dt;

@@ -8,38 +8,47 @@ namespace {
 constexpr std::size_t kMaxSamples = 2000;
 }  // namespace
 
-std::optional<NavigationState> ImuPredictor::add(const ImuSample& imu) {
+void ImuPredictor::add(const ImuSample& imu) {
   if (samples_.size() >= kMaxSamples) {
     samples_.erase(samples_.begin(), samples_.begin() + kMaxSamples / 2);
   }
   samples_.push_back(imu);
   advance(imu.stamp);
-  return head_;
 }
 
-const std::optional<NavigationState>& ImuPredictor::anchor(Stamp stamp,
-                                                           const NavigationState& state,
-                                                           double accel_scale) {
+void ImuPredictor::anchor(Stamp stamp, const NavigationState& state, double accel_scale,
+                          const GyroCompletion& completion) {
   const auto after = std::upper_bound(samples_.begin(), samples_.end(), stamp,
                                       [](Stamp t, const ImuSample& s) { return t < s.stamp; });
   if (after != samples_.begin()) samples_.erase(samples_.begin(), after - 1);
   head_ = state;
   head_stamp_ = stamp;
   accel_scale_ = accel_scale;
+  completion_ = completion;
   if (!samples_.empty()) advance(samples_.back().stamp);
-  return head_;
+}
+
+std::optional<NavigationState> ImuPredictor::at(Stamp stamp) const {
+  if (!head_ || samples_.empty() || stamp <= head_stamp_) return head_;
+  return integrate(stamp);
 }
 
 void ImuPredictor::advance(Stamp to) {
   if (!head_ || to <= head_stamp_) return;
+  head_ = integrate(to);
+  head_stamp_ = to;
+}
+
+NavigationState ImuPredictor::integrate(Stamp to) const {
   const auto after = std::upper_bound(samples_.begin(), samples_.end(), head_stamp_,
                                       [](Stamp t, const ImuSample& s) { return t < s.stamp; });
   const auto first = after == samples_.begin() ? after : after - 1;
-  for (const ImuInterval& imu :
-       imu_intervals({first, samples_.end()}, head_stamp_, to, accel_scale_)) {
-    head_ = propagate(*head_, imu);
+  NavigationState state = *head_;
+  for (ImuInterval& imu : imu_intervals({first, samples_.end()}, head_stamp_, to, accel_scale_)) {
+    completion_.complete(imu);
+    state = propagate(state, imu);
   }
-  head_stamp_ = to;
+  return state;
 }
 
 }  // namespace arex

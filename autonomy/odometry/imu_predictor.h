@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "messages/estimates.h"
+#include "odometry/gyro_clipping.h"
 #include "odometry/navigation_state.h"
 
 namespace arex {
@@ -13,21 +14,24 @@ namespace arex {
 /// since are integrated again.
 class ImuPredictor {
  public:
-  /// The state after `imu`; nothing before the first anchor.
-  std::optional<NavigationState> add(const ImuSample& imu);
-
+  void add(const ImuSample& imu);
   /// Starts anew from the state at `stamp`.
-  /// @returns the state after the newest sample.
-  const std::optional<NavigationState>& anchor(Stamp stamp, const NavigationState& state,
-                                               double accel_scale);
+  void anchor(Stamp stamp, const NavigationState& state, double accel_scale,
+              const GyroCompletion& completion);
+
+  /// The state at `stamp`, the newest sample held if that lies behind; nothing before the first
+  /// anchor.
+  [[nodiscard]] std::optional<NavigationState> at(Stamp stamp) const;
 
  private:
   void advance(Stamp to);
+  [[nodiscard]] NavigationState integrate(Stamp to) const;
 
   std::vector<ImuSample> samples_;  ///< from one at or before the anchor on
   std::optional<NavigationState> head_;
   Stamp head_stamp_ = 0;
   double accel_scale_ = 1;
+  GyroCompletion completion_;
 };
 
 }  // namespace arex

@@ -6,7 +6,9 @@ namespace arex {
 
 /// What the filter believes of the IMU, and how it starts.
 struct ImuNoiseConfig {
-  double gyro_noise_density = 1e-3;         ///< rad/s/sqrt(Hz)
+  double delay_s = 0.0025;                  ///< of the readings behind their stamps
+  double gyro_noise_density = 3e-4;         ///< rad/s/sqrt(Hz)
+  double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
   double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
   double gyro_walk_density = 2e-5;          ///< rad/s^2/sqrt(Hz)
   double accel_walk_density = 1e-3;         ///< m/s^3/sqrt(Hz)
@@ -14,15 +16,23 @@ struct ImuNoiseConfig {
   double clipped_gyro_noise_density = 0.3;  ///< of an axis at its limit, rad/s/sqrt(Hz)
 
   void fields(auto& f) {
+    f("delay_s", delay_s,
+      "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
+      "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
     f("gyro_noise_density", gyro_noise_density,
-      "rad/s/sqrt(Hz): ten times the sensor's white noise (reference.md, 4) for aliased vibration");
+      "rad/s/sqrt(Hz): three times the sensor's white noise (reference.md, 4), for aliased "
+      "vibration; more lets scans of a small scene tilt a vehicle that stands still");
+    f("gyro_scale_noise_density", gyro_scale_noise_density,
+      "1/sqrt(Hz), times the rate: errors of scale and alignment");
     f("accel_noise_density", accel_noise_density,
       "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and the vibration that its filter aliases");
     f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz) (reference.md, 4)");
     f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz) (reference.md, 4)");
-    f("gyro_range_radps", gyro_range_radps, "full scale of the gyro, 2000 deg/s");
+    f("gyro_range_radps", gyro_range_radps,
+      "full scale of the gyro, 2000 deg/s; a lower one is noticed");
     f("clipped_gyro_noise_density", clipped_gyro_noise_density,
       "rad/s/sqrt(Hz) while an axis reads its full scale");
+    f.check(delay_s > -0.1 && delay_s < 0.1, "-0.1 < delay_s < 0.1");
     f.check(gyro_noise_density > 0 && accel_noise_density > 0, "noise densities > 0");
     f.check(gyro_walk_density >= 0 && accel_walk_density >= 0, "walk densities >= 0");
   }
@@ -34,7 +44,7 @@ struct StaticInitialiserConfig {
   double max_gyro_std_radps = 0.02;
   double max_accel_std_mps2 = 0.3;
   double max_gyro_mean_radps = 0.1;
-  double gyro_bias_std_radps = 1e-3;
+  double gyro_bias_std_radps = 1e-4;
   double accel_bias_std_mps2 = 0.05;
   double gravity_std_mps2 = 0.005;
 
@@ -43,7 +53,8 @@ struct StaticInitialiserConfig {
     f("max_gyro_std_radps", max_gyro_std_radps, "a window that shakes more starts again");
     f("max_accel_std_mps2", max_accel_std_mps2, "a window that shakes more starts again");
     f("max_gyro_mean_radps", max_gyro_mean_radps, "a window that turns faster starts again");
-    f("gyro_bias_std_radps", gyro_bias_std_radps, "1 sigma of what the mean leaves unknown");
+    f("gyro_bias_std_radps", gyro_bias_std_radps,
+      "1 sigma of what changes it later, beside the noise of the mean");
     f("accel_bias_std_mps2", accel_bias_std_mps2,
       "turn-on bias of the accelerometer, 1 sigma (ICM-42688-P: 20 mg at most)");
     f("gravity_std_mps2", gravity_std_mps2,
@@ -120,7 +131,7 @@ struct RegistrationConfig {
   double converged_m = 1e-3;
   double gate_sigma = 4.0;
   double robust_sigma = 2.0;
-  double variance_inflation = 9.0;
+  double variance_inflation = 25.0;
 
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
@@ -142,13 +153,14 @@ struct RegistrationConfig {
 struct OdometryHealthConfig {
   int min_matches = 150;
   double min_match_fraction = 0.25;
-  double degenerate_position_std_m = 0.02;
-  double degenerate_rotation_std_rad = 0.005;
+  double degenerate_position_std_m = 0.033;
+  double degenerate_rotation_std_rad = 0.008;
   double lost_position_std_m = 0.5;
   double lost_rotation_std_rad = 0.2;
   double degenerate_silence_s = 0.35;
   double lost_silence_s = 3.0;
   int lost_scans = 5;
+  double doubtful_surprise = 4.0;
   int recovery_points = 300;
   int recovery_yaw_steps = 36;
   double recovery_radius_m = 2.0;
@@ -169,6 +181,9 @@ struct OdometryHealthConfig {
     f("degenerate_silence_s", degenerate_silence_s, "without a correction: degenerate");
     f("lost_silence_s", lost_silence_s, "without a correction: lost");
     f("lost_scans", lost_scans, "refused scans in a row: lost");
+    f("doubtful_surprise", doubtful_surprise,
+      "a scan that corrects the prediction by this many sigma contradicts the IMU: degenerate, and "
+      "kept out of the map; lost_scans of them in a row: lost");
     f("recovery_points", recovery_points, "of a scan scored at each guess of a recovery");
     f("recovery_yaw_steps", recovery_yaw_steps, "guesses around the vertical");
     f("recovery_radius_m", recovery_radius_m, "guesses reach this far to each side");

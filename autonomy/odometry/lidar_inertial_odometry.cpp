@@ -10,24 +10,31 @@ LidarInertialOdometry::LidarInertialOdometry(const LidarInertialConfig& config,
 
 LidarInertialOdometry::LidarInertialOdometry(const LidarInertialConfig& config, const Pose& X_BL,
                                              double body_radius_m)
-    : health_(config.health), corrector_(config, X_BL, body_radius_m) {}
+    : health_(config.health),
+      corrector_(config, X_BL, body_radius_m),
+      imu_delay_(from_seconds(config.imu.delay_s)),
+      full_scale_(config.imu.gyro_range_radps) {}
 
 Odometry LidarInertialOdometry::add_imu(const ImuSample& imu) {
-  unhanded_.push_back(imu);
   newest_ = imu;
-  publish(imu.stamp, predictor_.add(imu));
+  full_scale_.add(imu.gyro_radps);
+  unhanded_.push_back(imu);
+  unhanded_.back().stamp -= imu_delay_;
+  predictor_.add(unhanded_.back());
+  publish();
   return odometry_;
 }
 
 ScanJob LidarInertialOdometry::prepare(const LidarScanPtr& scan) {
-  return {scan, std::exchange(unhanded_, {})};
+  return {scan, std::exchange(unhanded_, {}), full_scale_.radps()};
 }
 
 void LidarInertialOdometry::apply(const ScanUpdate& update) {
   scan_status_ = update.status;
   odometry_.correction_stamp = update.correction_stamp;
   if (update.status == OdometryStatus::kInitialising) return;
-  publish(newest_.stamp, predictor_.anchor(update.stamp, update.state, update.accel_scale));
+  predictor_.anchor(update.stamp, update.state, update.accel_scale, update.gyro);
+  publish();
 }
 
 ScanUpdate LidarInertialOdometry::add_scan(const LidarScanPtr& scan) {
@@ -36,14 +43,15 @@ ScanUpdate LidarInertialOdometry::add_scan(const LidarScanPtr& scan) {
   return update;
 }
 
-void LidarInertialOdometry::publish(Stamp stamp, const std::optional<NavigationState>& state) {
-  odometry_.stamp = stamp;
+void LidarInertialOdometry::publish() {
+  const std::optional<NavigationState> state = predictor_.at(newest_.stamp);
+  odometry_.stamp = newest_.stamp;
   odometry_.status = scan_status_;
   if (!state) return;
   odometry_.X_OB = state->X_OB();
   odometry_.v_OB = state->v_OB;
   odometry_.w_OB_B = newest_.gyro_radps - state->b_g;
-  const double silence_s = to_seconds(stamp - odometry_.correction_stamp);
+  const double silence_s = to_seconds(newest_.stamp - odometry_.correction_stamp);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
   } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {

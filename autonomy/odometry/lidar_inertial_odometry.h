@@ -29,7 +29,8 @@ class LidarInertialOdometry {
   LidarInertialOdometry(const LidarInertialConfig& config, const VehicleConfig& vehicle);
   LidarInertialOdometry(const LidarInertialConfig& config, const Pose& X_BL, double body_radius_m);
 
-  /// Propagates by one sample and returns the estimate at its stamp.
+  /// Propagates by one sample and returns the estimate at its stamp. The readings are those of
+  /// `imu.delay_s` before; the newest one is held for that long.
   /// @pre imu.stamp is later than every stamp seen so far.
   Odometry add_imu(const ImuSample& imu);
 
@@ -47,12 +48,14 @@ class LidarInertialOdometry {
   [[nodiscard]] const SurfelMap& map() const { return corrector_.map(); }
 
  private:
-  void publish(Stamp stamp, const std::optional<NavigationState>& state);
+  void publish();
 
   OdometryHealthConfig health_;
   ScanCorrector corrector_;
   ImuPredictor predictor_;
-  std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet
+  Stamp imu_delay_;
+  GyroFullScale full_scale_;
+  std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;
   OdometryStatus scan_status_ = OdometryStatus::kInitialising;
   Odometry odometry_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -58,8 +59,9 @@ ErrorMatrix local_jacobian_inverse(const NavigationState& x, const NavigationSta
 struct ImuInterval {
   Stamp begin = 0;
   Stamp end = 0;
-  Vec3 gyro_begin, gyro_end;    ///< rad/s
-  Vec3 accel_begin, accel_end;  ///< m/s^2
+  Vec3 gyro_begin, gyro_end;           ///< rad/s
+  Vec3 accel_begin, accel_end;         ///< m/s^2
+  std::array<bool, 3> gyro_clipped{};  ///< axes of the gyro at their full scale
 
   [[nodiscard]] double dt_s() const { return to_seconds(end - begin); }
   [[nodiscard]] Vec3 mean_gyro() const { return 0.5 * (gyro_begin + gyro_end); }

@@ -1,5 +1,6 @@
 #include "odometry/registration.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
@@ -137,7 +138,12 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
   report.accepted =
       at_x.matched >= config.health.min_matches &&
       at_x.matched >= config.health.min_match_fraction * static_cast<double>(points.size());
-  if (report.accepted) filter.finish(x, at_x.information);
+  if (report.accepted) {
+    const Eigen::Matrix<double, 6, 1> d = local(filter.state(), x).head<6>();
+    const Eigen::Matrix<double, 6, 6> P = P_pose.topLeftCorner<6, 6>();
+    report.surprise = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
+    filter.finish(x, at_x.information);
+  }
   return report;
 }
 

@@ -16,6 +16,7 @@ struct RegistrationReport {
   int iterations = 0;
   double residual_rms_sigma = 0;  ///< of the matched, in sigma
   bool accepted = false;          ///< the filter was corrected
+  double surprise = 0;            ///< RMS of the pose's correction, in sigma of the prediction
   /// Standard deviation that this scan alone leaves, the worst direction first.
   Vec3 position_std_m = Vec3::Zero();
   Vec3 rotation_std_rad = Vec3::Zero();

@@ -17,27 +17,19 @@ ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL
 
 ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   imu_.insert(imu_.end(), job.imu.begin(), job.imu.end());
+  gyro_.full_scale_radps = job.gyro_full_scale_radps;
   ScanUpdate update;
   update.stamp = job.scan->end;
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
   } else {
-    const std::vector<MotionSegment> segments = predict_to(job.scan->end);
-    const std::vector<ScanPoint> points =
-        undistort(*job.scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
-    const std::vector<ScanPoint> thinned =
-        thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
-    if (status_ == OdometryStatus::kLost) {
-      update.recovered = recover(thinned, update.registration);
-    } else {
-      update.registration = register_scan(thinned, map_, config_, filter_);
-    }
-    judge(update.registration);
+    const std::vector<ScanPoint> points = register_with_motion(*job.scan, update);
+    judge(update);
     std::vector<Vec3f> points_O;
     if (update.registration.accepted && status_ != OdometryStatus::kLost) {
       points_O = to_O(points);
-      if (confirmations_left_ == 0) insert(points, points_O);
+      if (confirmations_left_ == 0 && doubtful_in_a_row_ == 0) insert(points, points_O);
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
   }
@@ -46,6 +38,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   update.state = filter_.state();
   update.covariance = filter_.covariance();
   update.accel_scale = accel_scale_;
+  update.gyro = gyro_;
   return update;
 }
 
@@ -79,37 +72,75 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   forget_imu_before(stamp_);
 }
 
-std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp) {
+std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan,
+                                                           ScanUpdate& update) {
+  // A clipped gyro bends the scan. What the scan then says of the missing rate unbends it.
+  constexpr int kPasses = 4;
+  constexpr double kSettled = 0.02;  // rad/s
+  const ErrorStateFilter before = filter_;
+  for (int pass = 1;; ++pass) {
+    ClippedTime clipped;
+    const std::vector<MotionSegment> segments = predict_to(scan.end, clipped);
+    std::vector<ScanPoint> points =
+        undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
+    const std::vector<ScanPoint> thinned =
+        thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+    update.gyro_clipped = clipped.any();
+    Vec3 missing = Vec3::Zero();
+    if (status_ == OdometryStatus::kLost) {
+      update.recovered = recover(thinned, update.registration);
+    } else {
+      const NavigationState predicted = filter_.state();
+      update.registration = register_scan(thinned, map_, config_, filter_);
+      missing = missing_rates(gyro_.missing_radps, clipped,
+                              local(predicted, filter_.state()).segment<3>(kRotation));
+    }
+    const double change = (missing - gyro_.missing_radps).norm();
+    gyro_.missing_radps = missing;
+    if (!clipped.any() || change < kSettled || pass == kPasses) {
+      stamp_ = scan.end;
+      forget_imu_before(stamp_);
+      return points;
+    }
+    filter_ = before;
+  }
+}
+
+std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (const ImuInterval& imu : imu_intervals(imu_, stamp_, stamp, accel_scale_)) {
+  for (ImuInterval& imu : imu_intervals(imu_, stamp_, stamp, accel_scale_)) {
+    gyro_.complete(imu);
+    clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));
     filter_.predict(imu);
   }
-  stamp_ = stamp;
-  forget_imu_before(stamp);
   return segments;
 }
 
-void ScanCorrector::judge(const RegistrationReport& report) {
+void ScanCorrector::judge(const ScanUpdate& update) {
   const OdometryHealthConfig& hc = config_.health;
+  const RegistrationReport& report = update.registration;
   if (report.accepted) {
     refused_in_a_row_ = 0;
     correction_stamp_ = stamp_;
     corrected_position_ = filter_.state().p_OB;
     if (confirmations_left_ > 0) --confirmations_left_;
-  } else {
+  } else if (report.points >= hc.min_matches) {  // fewer are silence, which the IMU bridges
     ++refused_in_a_row_;
   }
+  const bool doubtful = report.accepted && report.surprise > hc.doubtful_surprise;
+  doubtful_in_a_row_ = doubtful ? doubtful_in_a_row_ + 1 : 0;
   const PoseInformation::Matrix P = filter_.pose_covariance();
   const double rotation_std = std::sqrt(P.diagonal().segment<3>(0).maxCoeff());
   const double position_std = std::sqrt(P.diagonal().segment<3>(3).maxCoeff());
   const bool weak = report.position_std_m[0] > hc.degenerate_position_std_m ||
                     report.rotation_std_rad[0] > hc.degenerate_rotation_std_rad;
-  if (refused_in_a_row_ >= hc.lost_scans || position_std > hc.lost_position_std_m ||
-      rotation_std > hc.lost_rotation_std_rad) {
+  if (refused_in_a_row_ >= hc.lost_scans || doubtful_in_a_row_ >= hc.lost_scans ||
+      position_std > hc.lost_position_std_m || rotation_std > hc.lost_rotation_std_rad) {
     status_ = OdometryStatus::kLost;
-  } else if (!report.accepted || weak || confirmations_left_ > 0) {
+  } else if (!report.accepted || weak || doubtful || update.gyro_clipped ||
+             confirmations_left_ > 0) {
     status_ = OdometryStatus::kDegenerate;
   } else {
     status_ = OdometryStatus::kOk;
@@ -126,7 +157,7 @@ bool ScanCorrector::recover(const std::vector<ScanPoint>& points, RegistrationRe
   }
   filter_ = found->filter;
   report = found->report;
-  refused_in_a_row_ = 0;
+  refused_in_a_row_ = doubtful_in_a_row_ = 0;
   confirmations_left_ = config_.health.recovery_confirmations;
   return true;
 }

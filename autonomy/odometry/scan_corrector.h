@@ -5,6 +5,7 @@
 
 #include "messages/estimates.h"
 #include "messages/sensors.h"
+#include "odometry/gyro_clipping.h"
 #include "odometry/registration.h"
 #include "odometry/static_initialiser.h"
 
@@ -15,6 +16,7 @@ namespace arex {
 struct ScanJob {
   LidarScanPtr scan;
   std::vector<ImuSample> imu;
+  double gyro_full_scale_radps = 0;  ///< as far as it is known
 };
 
 using PointsPtr = std::shared_ptr<const std::vector<Vec3f>>;
@@ -27,6 +29,8 @@ struct ScanUpdate {
   NavigationState state;
   ErrorMatrix covariance = ErrorMatrix::Zero();
   double accel_scale = 1;
+  GyroCompletion gyro;        ///< of the axes that are clipped
+  bool gyro_clipped = false;  ///< during this scan
   RegistrationReport registration;
   bool recovered = false;  ///< the pose was found again on the map: it may have jumped
   PointsPtr points_O;      ///< undistorted, in O, m; empty when the state is not to be trusted
@@ -44,8 +48,9 @@ class ScanCorrector {
 
  private:
   void try_start(const LidarScanPtr& scan);
-  std::vector<MotionSegment> predict_to(Stamp stamp);
-  void judge(const RegistrationReport& report);
+  std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
+  std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
+  void judge(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
   [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
@@ -57,6 +62,7 @@ class ScanCorrector {
   ErrorStateFilter filter_;
   SurfelMap map_;
   double accel_scale_ = 1;
+  GyroCompletion gyro_;
   std::vector<ImuSample> imu_;
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
   Stamp stamp_ = 0;                           ///< of the filter's state
@@ -64,6 +70,7 @@ class ScanCorrector {
   Vec3 corrected_position_ = Vec3::Zero();
   OdometryStatus status_ = OdometryStatus::kInitialising;
   int refused_in_a_row_ = 0;
+  int doubtful_in_a_row_ = 0;
   int confirmations_left_ = 0;
 };
 

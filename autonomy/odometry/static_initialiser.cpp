@@ -100,13 +100,16 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
   x.b_g = m.gyro_mean;
   x.X_BL = X_BL;
   ErrorStateFilter filter(config.imu);
-  filter.reset(x, prior_covariance(sc));
+  ErrorMatrix P = prior_covariance(sc);
+  const double mean_share = 1 / static_cast<double>(window.size());
+  P.diagonal().segment<3>(kGyroBias).array() += m.gyro_std * m.gyro_std * mean_share;
+  filter.reset(x, P);
 
   // At rest f_B = -R^T g + b_a.
   Eigen::Matrix<double, 3, kErrorDim> H = Eigen::Matrix<double, 3, kErrorDim>::Zero();
   H.block<3, 3>(0, kGravityBlock) = -x.R_OB.transpose();
   H.block<3, 3>(0, kAccelBias) = Mat3::Identity();
-  const double mean_variance = m.accel_std * m.accel_std / static_cast<double>(window.size());
+  const double mean_variance = m.accel_std * m.accel_std * mean_share;
   filter.correct<3>(f_B + x.R_OB.transpose() * x.g_O - x.b_a, H, mean_variance * Mat3::Identity());
 
   // |g| = G.

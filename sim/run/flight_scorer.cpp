@@ -20,7 +20,9 @@ void FlightScorer::sample(const Truth& truth, const Stack& stack, bool flying,
                           const BatteryState& battery, Recorder* recorder) {
   const Odometry& odometry = stack.odometry();
   if (odometry.status == OdometryStatus::kLost) odometry_lost_s_ += to_seconds(kPeriod);
-  if (odometry.status != OdometryStatus::kInitialising && odometry.stamp == truth.stamp) {
+  if (odometry.status != OdometryStatus::kInitialising && odometry.stamp > last_estimate_) {
+    // What the stack holds for now is scored as such, whatever the IMU's clock says.
+    last_estimate_ = odometry.stamp;
     // The stack's O is where its odometry began; truth is compared in that frame from then on.
     if (poses_.empty()) X_WO_ = truth.X_WB * odometry.X_OB.inverse();
     poses_.push_back({truth.stamp, truth.X_WB, odometry.X_OB});

@@ -51,6 +51,7 @@ class FlightScorer {
   Pose X_WO_;
   std::vector<PosePair> poses_;
   double odometry_lost_s_ = 0;
+  Stamp last_estimate_ = -1;  ///< stamp of the newest one scored
   double distance_m_ = 0;
   double tracking_sum_ = 0;
   std::size_t tracking_count_ = 0;

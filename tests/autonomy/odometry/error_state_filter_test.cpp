@@ -84,6 +84,7 @@ class KnownMap {
   KnownMap() : motion_(test::loop_points(20, 12, 1.0, 1.5, 0.8, 1), 0.8, 0.3) {
     noise_.gyro_noise_density = 2e-3;
     noise_.accel_noise_density = 0.02;
+    noise_.gyro_scale_noise_density = 0;
     noise_.gyro_walk_density = 1e-3;
     noise_.accel_walk_density = 1e-2;
   }
@@ -202,18 +203,20 @@ TEST(ErrorStateFilter, NeesLiesInItsBandOnAKnownMap) {
 
 TEST(ErrorStateFilter, AClippedGyroAxisIsDoubted) {
   ImuNoiseConfig noise;
-  noise.gyro_range_radps = 4;
   ErrorStateFilter filter(noise);
   filter.reset(NavigationState{}, ErrorMatrix::Zero());
   ImuInterval imu;
   imu.end = 5'000'000;
   imu.accel_begin = imu.accel_end = Vec3(0, 0, kGravity);
   imu.gyro_begin = imu.gyro_end = Vec3(0, 0, 4);
+  imu.gyro_clipped = {false, false, true};
   filter.predict(imu);
   EXPECT_NEAR(std::sqrt(filter.covariance()(2, 2)),
               noise.clipped_gyro_noise_density * std::sqrt(0.005), 1e-4);
-  EXPECT_NEAR(std::sqrt(filter.covariance()(0, 0)), noise.gyro_noise_density * std::sqrt(0.005),
-              2e-5);
+  EXPECT_NEAR(
+      std::sqrt(filter.covariance()(0, 0)),
+      std::hypot(noise.gyro_noise_density, 4 * noise.gyro_scale_noise_density) * std::sqrt(0.005),
+      2e-5);
 }
 
 }  // namespace

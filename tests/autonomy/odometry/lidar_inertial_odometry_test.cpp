@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "math/so3.h"
@@ -59,8 +60,15 @@ struct Flown {
 
 using Tamper = std::function<LidarScanPtr(const LidarScanPtr&)>;
 
-Flown fly(const Recording& r, const LidarInertialConfig& config, Stamp latency = 20'000'000,
-          const Tamper& tamper = {}) {
+/// The analytic IMU reads without delay.
+LidarInertialConfig defaults() {
+  LidarInertialConfig config;
+  config.imu.delay_s = 0;
+  return config;
+}
+
+Flown fly(const Recording& r, const LidarInertialConfig& config = defaults(),
+          Stamp latency = 20'000'000, const Tamper& tamper = {}) {
   LidarInertialOdometry odometry(config, mounting(), kRadius);
   Flown run;
   std::size_t next = 0;
@@ -152,7 +160,7 @@ TEST(StaticInitialiser, WaitsWhileItIsShakenOrTurned) {
 }
 
 TEST(LidarInertialOdometry, FollowsAFlightThroughAForest) {
-  const Flown run = fly(forest(), {});
+  const Flown run = fly(forest());
   EXPECT_LT(worst_error(forest(), run), 0.03);
   EXPECT_EQ(count(run, OdometryStatus::kDegenerate), 0);
   EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
@@ -166,7 +174,7 @@ TEST(LidarInertialOdometry, FollowsAFlightThroughAForest) {
 }
 
 TEST(LidarInertialOdometry, TheFastOutputIsAsGoodAsTheScans) {
-  const Flown run = fly(forest(), {});
+  const Flown run = fly(forest());
   double worst = 0;
   for (const Odometry& o : run.fast) {
     if (o.status != OdometryStatus::kOk) continue;
@@ -177,7 +185,7 @@ TEST(LidarInertialOdometry, TheFastOutputIsAsGoodAsTheScans) {
 }
 
 TEST(LidarInertialOdometry, PointsLieOnTheSurfaces) {
-  const Flown run = fly(forest(), {});
+  const Flown run = fly(forest());
   std::vector<double> errors;
   for (const ScanUpdate& u : run.updates) {
     for (std::size_t i = 0; i < u.points_O->size(); i += 37) {
@@ -191,13 +199,13 @@ TEST(LidarInertialOdometry, PointsLieOnTheSurfaces) {
 }
 
 TEST(LidarInertialOdometry, HoldsStillOnAStaticVehicle) {
-  const Flown run = fly(standing(), {});
+  const Flown run = fly(standing());
   EXPECT_LT(worst_error(standing(), run), 0.01);
   EXPECT_GT(count(run, OdometryStatus::kOk), 59 * 200);
 }
 
 TEST(LidarInertialOdometry, LatencyChangesWhenNotWhat) {
-  const Flown now = fly(forest(), {}, 0), late = fly(forest(), {}, 60'000'000);
+  const Flown now = fly(forest(), defaults(), 0), late = fly(forest(), defaults(), 60'000'000);
   ASSERT_EQ(now.updates.size(), late.updates.size() + 1);  // the last comes after the end
   for (std::size_t i = 0; i < late.updates.size(); ++i) {
     EXPECT_EQ(now.updates[i].state.p_OB, late.updates[i].state.p_OB);
@@ -218,7 +226,7 @@ TEST(LidarInertialOdometry, LatencyChangesWhenNotWhat) {
 }
 
 TEST(LidarInertialOdometry, TwoRunsAreBitIdentical) {
-  const Flown a = fly(forest(), {}), b = fly(forest(), {});
+  const Flown a = fly(forest()), b = fly(forest());
   ASSERT_EQ(a.updates.size(), b.updates.size());
   for (std::size_t i = 0; i < a.updates.size(); ++i) {
     EXPECT_EQ(a.updates[i].state.p_OB, b.updates[i].state.p_OB);
@@ -231,7 +239,7 @@ TEST(LidarInertialOdometry, SurvivesASecondWithoutScans) {
   const Tamper silence = [](const LidarScanPtr& scan) {
     return scan->stamp >= from_seconds(9) && scan->stamp < from_seconds(10) ? nullptr : scan;
   };
-  const Flown run = fly(forest(), {}, 20'000'000, silence);
+  const Flown run = fly(forest(), defaults(), 20'000'000, silence);
   EXPECT_LT(worst_error(forest(), run), 0.06);
   EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
   EXPECT_GT(count(run, OdometryStatus::kDegenerate), 100);  // and says so meanwhile
@@ -245,7 +253,7 @@ TEST(LidarInertialOdometry, SurvivesEmptyScans) {
     none->points.clear();
     return none;
   };
-  const Flown run = fly(forest(), {}, 20'000'000, empty);
+  const Flown run = fly(forest(), defaults(), 20'000'000, empty);
   EXPECT_LT(worst_error(forest(), run), 0.04);
   EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
 }
@@ -257,7 +265,7 @@ TEST(LidarInertialOdometry, SurvivesTheLossOfEveryFifthPoint) {
     std::erase_if(rest->points, [&](const LidarPoint&) { return random.uniform() < 0.2; });
     return rest;
   };
-  EXPECT_LT(worst_error(forest(), fly(forest(), {}, 20'000'000, thinned)), 0.03);
+  EXPECT_LT(worst_error(forest(), fly(forest(), defaults(), 20'000'000, thinned)), 0.03);
 }
 
 TEST(LidarInertialOdometry, SurvivesABurstOfFalseReturns) {
@@ -273,7 +281,7 @@ TEST(LidarInertialOdometry, SurvivesABurstOfFalseReturns) {
       }
       return wrong;
     };
-    const Flown run = fly(forest(), {}, 20'000'000, burst);
+    const Flown run = fly(forest(), defaults(), 20'000'000, burst);
     EXPECT_LT(worst_error(forest(), run), 0.04) << share;
     EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
     EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
@@ -291,7 +299,7 @@ TEST(LidarInertialOdometry, RecoversOnItsMapAfterALoss) {
     }
     return wrong;
   };
-  const Flown run = fly(forest(), {}, 20'000'000, elsewhere);
+  const Flown run = fly(forest(), defaults(), 20'000'000, elsewhere);
   EXPECT_GT(count(run, OdometryStatus::kLost), 50);
   EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
   const ScanUpdate& last = run.updates.back();
@@ -304,7 +312,7 @@ TEST(LidarInertialOdometry, SaysThatAPlainTellsTooLittle) {
   const Recording plain =
       record(test::AnalyticWorld::plain(), {test::loop_points(24, 16, 1.5, 1.5, 0.8, 1), 0.8, 1.5},
              6, {}, 1, 8);
-  const Flown run = fly(plain, {});
+  const Flown run = fly(plain);
   EXPECT_NE(run.fast.back().status, OdometryStatus::kOk);
   const auto weak = std::find_if(run.updates.begin(), run.updates.end(), [](const ScanUpdate& u) {
     return u.status == OdometryStatus::kDegenerate;
@@ -319,11 +327,96 @@ TEST(LidarInertialOdometry, FindsAMountingThatIsOffByADegree) {
   Pose X_BL = mounting();
   X_BL.R = X_BL.R * so3::Exp(offset);
   const Recording r = record(forest().world, forest().motion, 16, {}, 4, 8, X_BL);
-  LidarInertialConfig config;
+  LidarInertialConfig config = defaults();
   config.estimate_extrinsics = true;
   const Flown run = fly(r, config);
   const Mat3 error = run.updates.back().state.X_BL.R.transpose() * X_BL.R;
   EXPECT_LT(so3::angle(error), 0.2 * 3.14159 / 180);
+}
+
+TEST(LidarInertialOdometry, AKnownDelayOfTheImuCostsNothing) {
+  Recording late = forest();
+  for (ImuSample& sample : late.imu) sample.stamp += 20'000'000;
+  LidarInertialConfig config = defaults();
+  config.imu.delay_s = 0.02;
+  LidarInertialOdometry odometry(config, mounting(), kRadius),
+      prompt(defaults(), mounting(), kRadius);
+  std::size_t i = 0, j = 0;
+  for (const LidarScanPtr& scan : late.scans) {
+    // Both have heard the vehicle up to the scan's end.
+    while (i < late.imu.size() && late.imu[i].stamp <= scan->end + 20'000'000) {
+      odometry.add_imu(late.imu[i++]);
+    }
+    while (j < forest().imu.size() && forest().imu[j].stamp <= scan->end) {
+      prompt.add_imu(forest().imu[j++]);
+    }
+    const ScanUpdate a = odometry.add_scan(scan), b = prompt.add_scan(scan);
+    EXPECT_EQ(a.state.p_OB, b.state.p_OB);
+  }
+  // The output is for the stamp of the sample: the newest reading is held over the delay.
+  const Odometry& out = odometry.odometry();
+  EXPECT_LT(position_error(forest(), out.stamp, out.X_OB.p), 0.03);
+}
+
+/// Turns on the spot ever faster; the gyro reads no more than `full_scale`.
+Recording spin(double full_scale_radps, double rate_radps) {
+  std::vector<Vec4> points(4, Vec4::Zero());
+  constexpr double kKnot = 0.25;
+  double rate = 0, yaw = 0;
+  const auto turn = [&](double to, double seconds) {
+    for (double t = 0; t < seconds; t += kKnot) {
+      rate += std::clamp(to - rate, -2.0 * kKnot, 2.0 * kKnot);
+      yaw += rate * kKnot;
+      points.emplace_back(0, 0, 0, yaw);
+    }
+  };
+  turn(rate_radps, 5);
+  turn(0, 4);
+  Recording r = record(test::AnalyticWorld::hall(), {points, kKnot, 2}, 12, {}, 6, 6);
+  for (ImuSample& sample : r.imu) {
+    sample.gyro_radps = sample.gyro_radps.cwiseMax(-full_scale_radps).cwiseMin(full_scale_radps);
+  }
+  return r;
+}
+
+TEST(LidarInertialOdometry, CarriesOnAndSaysSoWhileTheGyroIsClipped) {
+  for (const double side : {1.0, -1.0}) {
+    const Recording r = spin(2.5, side * 3.5);
+    const Flown run = fly(r);
+    EXPECT_LT(worst_error(r, run), 0.05);
+    int clipped = 0;
+    for (const ScanUpdate& u : run.updates) {
+      const double rate = r.motion.at(to_seconds(u.stamp)).w_OB_B.norm();
+      if (u.gyro_clipped) {
+        ++clipped;
+        EXPECT_NE(u.status, OdometryStatus::kOk);
+        EXPECT_GT(rate, 1.9);
+      }
+      if (rate > 3.4) {
+        // 12 mrad of error in the turn of a scan of 0.1 s, which shows half of it.
+        EXPECT_NEAR(u.gyro.missing_radps.z(), rate - 2.5, 0.25);
+      }
+    }
+    EXPECT_GT(clipped, 15);
+    EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
+    EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk);
+    const ScanUpdate& last = run.updates.back();
+    const Mat3 error = r.motion.at(to_seconds(last.stamp)).X_OB.R.transpose() * last.state.R_OB;
+    EXPECT_LT(so3::angle(error), 0.01);
+  }
+}
+
+TEST(GyroFullScale, IsLearnedFromRepeatedReadingsOnly) {
+  GyroFullScale scale(34.9);
+  RandomStream random(1, "gyro");
+  for (int i = 0; i < 1000; ++i) scale.add(5 * Vec3::UnitZ() + 1e-3 * random.normal3());
+  EXPECT_EQ(scale.radps(), 34.9);
+  for (int i = 0; i < 1000; ++i) scale.add(Vec3::Zero());  // rest without noise is no full scale
+  EXPECT_EQ(scale.radps(), 34.9);
+  for (int i = 0; i < 5; ++i) scale.add({0, -4.36, 0.01 * i});
+  EXPECT_EQ(scale.radps(), 4.36);
+  scale.add({0, 5, 0});  // more than that: it was none
+  EXPECT_EQ(scale.radps(), 34.9);
 }
 
 TEST(LidarInertialOdometry, BeforeTheStartItSaysSo) {

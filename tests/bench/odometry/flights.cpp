@@ -1,5 +1,6 @@
 #include "flights.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -128,7 +129,8 @@ Flight::Flight(const FlightOptions& options, const std::filesystem::path& record
     file_ = recordings / options.name();
     std::filesystem::create_directories(file_);
   }
-  scans_ = static_cast<int>(std::floor(simulation_->motion.end_s() * 10));
+  scans_ =
+      static_cast<int>(std::floor(std::min(simulation_->motion.end_s(), options.longest_s) * 10));
   sim::ImuConfig config;
   config.noise_free = options.noise_free;
   config.gyro_noise_density *= options.imu_noise_factor;

@@ -21,6 +21,7 @@ struct FlightOptions {
   std::string world = "forest";  ///< forest or garage
   std::uint64_t seed = 1;
   double speed_mps = 1.5;
+  double longest_s = 1e9;          ///< the flight is cut there
   double lidar_noise_floor_m = 0;  ///< least range sigma
   double imu_noise_factor = 1;     ///< on densities and walks
   Vec3 extrinsic_error_rad = Vec3::Zero();

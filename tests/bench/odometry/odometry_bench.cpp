@@ -1,7 +1,7 @@
 /// Accuracy and speed of the LiDAR-inertial odometry on flights through the simulator's worlds.
 ///
 ///     odometry_bench [--flights forest,garage] [--seeds 3] [--first-seed 1] [--lidar-noise 0.02]
-///                    [--imu-noise 5] [--extrinsic-deg 1] [--clean] [--record DIR]
+///                    [--imu-noise 5] [--extrinsic-deg 1] [--clean] [--seconds 20] [--record DIR]
 ///                    [--trace FILE] [--set key=value]...
 ///
 /// Every scan's update becomes visible 20 ms after its end, as in the stack. Times are the thread's
@@ -9,6 +9,7 @@
 
 #include <time.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -46,9 +47,20 @@ struct Result {
   double matched = 0;
   int not_ok = 0;
   std::vector<double> map_error_m;
+  std::vector<double> nees;  ///< of the pose at each update, 6 dimensions; expected 6
   NavigationState last;
   std::size_t map_bytes = 0;
 };
+
+/// e^T P^-1 e of attitude and position, the truth seen from where the odometry began.
+double pose_nees(const ScanUpdate& update, const Pose& X_OB_true) {
+  NavigationState truth = update.state;
+  truth.R_OB = X_OB_true.R;
+  truth.p_OB = X_OB_true.p;
+  const Eigen::Matrix<double, 6, 1> e = local(update.state, truth).head<6>();
+  const Eigen::Matrix<double, 6, 6> P = update.covariance.topLeftCorner<6, 6>();
+  return e.dot(P.ldlt().solve(e));
+}
 
 Result fly(bench::Flight& flight, const LidarInertialConfig& config, std::ofstream& trace) {
   LidarInertialOdometry odometry(config, VehicleConfig{});
@@ -84,6 +96,8 @@ Result fly(bench::Flight& flight, const LidarInertialConfig& config, std::ofstre
       if (update.status == OdometryStatus::kInitialising) continue;
       at_scans.push_back({update.stamp, flight.X_WB(update.stamp), update.state.X_OB()});
       if (update.registration.points == 0) continue;
+      result.nees.push_back(
+          pose_nees(update, sim::align_at_start(at_scans).inverse() * at_scans.back().X_WB));
       result.update_ms.push_back(spent);
       result.matched += update.registration.matched;
       result.not_ok += update.status != OdometryStatus::kOk;
@@ -169,6 +183,8 @@ int main(int argc, char** argv) {
           Vec3(0.6, -0.6, 0.53).normalized() * std::stod(value()) / 57.29578;
     } else if (key == "--clean") {
       options.noise_free = true;
+    } else if (key == "--seconds") {
+      options.longest_s = std::stod(value());
     } else if (key == "--record") {
       recordings = value();
     } else if (key == "--trace") {
@@ -193,6 +209,9 @@ int main(int argc, char** argv) {
       if (!trace_file.empty()) trace.open(trace_file + "-" + options.name() + ".csv");
       const Result result = fly(flight, config, trace);
       print_row(options.name(), flight.distance_m(), result);
+      std::printf("    pose NEES: median %.1f, p95 %.1f (consistent: 5.3, 12.6); map %.1f MB\n",
+                  quantile(result.nees, 0.5), quantile(result.nees, 0.95),
+                  1e-6 * static_cast<double>(result.map_bytes));
       if (config.estimate_extrinsics) {
         const Pose X_BL = VehicleConfig{}.X_BL();
         const Mat3 truth = X_BL.R * so3::Exp(options.extrinsic_error_rad);

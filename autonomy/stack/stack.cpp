@@ -9,6 +9,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       jobs_(jobs),
       lidar_inertial_(config.odometry.lidar_inertial, config.vehicle),
       odometry_lane_(jobs.add_lane("odometry")),
+      lidar_watch_(config.odometry.watch),
       energy_(config.exploration.explorer.consumption),
       perception_(config, jobs),
       explorer_(config.exploration.explorer, config.mapping.resolution_m, seed),
@@ -45,6 +46,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
+  lidar_watch_.add_scan(now_, scan->points.size());
   if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) {
     perception_.add_scan(now_, scan);
     return;
@@ -53,6 +55,7 @@ void Stack::add_scan(const LidarScanPtr& scan) {
               [this, job = lidar_inertial_.prepare(scan)]() -> JobQueue::Delivery {
                 return [this, update = lidar_inertial_.correct(job)] {
                   lidar_inertial_.apply(update);
+                  lidar_watch_.add_registration(update.registration);
                   set_odometry(lidar_inertial_.odometry());
                   perception_.add_scan(now_, update);
                 };
@@ -79,6 +82,9 @@ void Stack::set_odometry(const Odometry& odometry) {
 std::optional<AttitudeCommand> Stack::tick() {
   if (now_ < next_control_) return std::nullopt;
   next_control_ += control_period_;
+  if (const auto fault = lidar_watch_.update(now_)) {
+    report(EventKind::kSensorFault, std::string(*fault));
+  }
   decide();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();

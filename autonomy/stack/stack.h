@@ -13,6 +13,7 @@
 #include "odometry/lidar_inertial_odometry.h"
 #include "stack/job_queue.h"
 #include "stack/leg_motion.h"
+#include "stack/lidar_watch.h"
 #include "stack/navigator.h"
 #include "stack/perception.h"
 #include "stack/stack_config.h"
@@ -74,6 +75,7 @@ class Stack {
 
   LidarInertialOdometry lidar_inertial_;
   JobQueue::Lane odometry_lane_;
+  LidarWatch lidar_watch_;
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;

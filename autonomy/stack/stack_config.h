@@ -14,6 +14,7 @@
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
 #include "stack/leg_motion.h"
+#include "stack/lidar_watch.h"
 
 namespace arex {
 
@@ -26,11 +27,13 @@ struct OdometryConfig {
   Source source = Source::kLidarInertial;
   double latency_s = 0.020;  ///< modelled compute time of a scan update
   LidarInertialConfig lidar_inertial;
+  LidarWatchConfig watch;
 
   void fields(auto& f) {
     f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
     f("latency_s", latency_s, "modelled compute time of a scan update");
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
+    f("watch", watch, "when the LiDAR is called faulty");
     f.check(latency_s >= 0, "latency_s >= 0");
   }
 };

@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "run/simulation.h"
+
+namespace arex::sim {
+namespace {
+
+/// The flight on its own odometry, and what it told meanwhile.
+struct Flown {
+  FlightResult result;
+  std::string events;       ///< events.csv
+  double degenerate_s = 0;  ///< in the air
+
+  [[nodiscard]] bool told(const std::string& what) const {
+    return events.find(what) != std::string::npos;
+  }
+};
+
+Flown fly(const std::string& scenario, std::vector<std::string> overrides) {
+  overrides.emplace_back("mapping.use_depth=false");
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) /
+      testing::UnitTest::GetInstance()->current_test_info()->name();
+  Flown flown;
+  {
+    Recorder recorder(folder, "");
+    Simulation simulation(
+        load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 1);
+    simulation.record_to(recorder);
+    while (simulation.tick()) {
+      const bool degenerate = simulation.stack().odometry().status == OdometryStatus::kDegenerate;
+      if (degenerate) flown.degenerate_s += to_seconds(kNanosecondsPerTick);
+    }
+    flown.result = simulation.finish();
+    recorder.flush();
+  }
+  std::ostringstream text;
+  text << std::ifstream(folder / "events.csv").rdbuf();
+  flown.events = text.str();
+  return flown;
+}
+
+void expect_arrival(const FlightResult& result) {
+  EXPECT_EQ(result.outcome, Outcome::kSucceeded) << result.reason;
+  EXPECT_EQ(result.collisions, 0);
+  EXPECT_EQ(result.flight.odometry_lost_s, 0);
+}
+
+TEST(OdometryFlight, GoesDownTheRampAndAlongTheGarage) {
+  const Flown flown = fly("garage_waypoints", {});
+  expect_arrival(flown.result);
+  EXPECT_GT(flown.result.flight.distance_m, 150);
+  const OdometryScore& score = flown.result.flight.odometry;
+  EXPECT_LT(score.ate_rmse_m, 0.05);
+  EXPECT_LT(score.ate_se3_rmse_m, 0.02);
+  EXPECT_LT(score.yaw_error_max_deg, 0.4);
+  EXPECT_FALSE(flown.told("sensor_fault"));
+}
+
+// 0.1 of the returns false for half a second, none at all for one second, a fifth gone throughout.
+TEST(OdometryFlight, OutlivesFaultsOfTheLidarAndTellsThem) {
+  const Flown flown =
+      fly("waypoints",
+          {"mission.waypoints_m=[[15, -2, 1.5], [0, 0, 1.5]]", "lidar.fault_dropout_fraction=0.2",
+           "lidar.fault_false_burst_from_s=11", "lidar.fault_false_burst_for_s=0.5",
+           "lidar.fault_silent_from_s=16", "lidar.fault_silent_for_s=1"});
+  expect_arrival(flown.result);
+  EXPECT_LT(flown.result.flight.odometry.ate_max_m, 0.15);
+  EXPECT_TRUE(flown.told("sensor_fault,lidar silent"));
+  EXPECT_TRUE(flown.told("sensor_fault,lidar sound again"));
+  EXPECT_TRUE(flown.told("odometry_status,degenerate"));
+  EXPECT_GT(flown.degenerate_s, 0.5);
+}
+
+TEST(OdometryFlight, SpinsFasterThanItsGyroReads) {
+  const Flown flown = fly("yaw_burst", {"imu.gyro_range_radps=2.5"});
+  expect_arrival(flown.result);
+  EXPECT_LT(flown.result.flight.odometry.ate_max_m, 0.1);
+  EXPECT_GT(flown.degenerate_s, 5);  // two bursts of four seconds are beyond it
+}
+
+}  // namespace
+}  // namespace arex::sim

@@ -102,12 +102,12 @@ void add_log(MeshBuilder& builder, const HeightField& terrain, const Vec2& middl
     const double t = random.uniform(0.35, 0.95);
     const double roll = random.uniform(0.15, 0.85) * std::numbers::pi;
     const Vec3 out = std::cos(roll) * across + std::sin(roll) * Vec3::UnitZ() + 0.7 * along;
-    const std::array<Vec3, 2> stub{
+    const std::array<Vec3, 2> snag{
         butt + t * (top - butt),
         butt + t * (top - butt) + random.uniform(0.3, kMaxStubLength) * out.normalized()};
-    const std::array<double, 2> stub_radii{0.022, 0.007};
-    builder.add_tube(object, stub, stub_radii, 5);
-    builder.add_collision_capsule(object, stub[0], stub[1], stub_radii[0]);
+    const std::array<double, 2> snag_radii{0.022, 0.007};
+    builder.add_tube(object, snag, snag_radii, 5);
+    builder.add_collision_capsule(object, snag[0], snag[1], snag_radii[0]);
   }
 }
 

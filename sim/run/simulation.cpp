@@ -11,6 +11,7 @@ namespace {
 constexpr Stamp kTick = kNanosecondsPerTick;
 constexpr Stamp kStatusPeriod = 5 * kTick;  // 200 Hz: what the autopilot tells, the battery, mocap
 constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leaves it
+constexpr Stamp kPathPeriod = 100 * kTick;      // 10 Hz: revisits and turns
 constexpr Stamp kCoveragePeriod = 1000 * kTick;
 constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
 constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
@@ -207,6 +208,7 @@ void Simulation::record() {
   for (const Decision& decision : stack_.take_decisions()) {
     if (recorder_) recorder_->decision(decision);
   }
+  if (coverage_ && now_ % kPathPeriod == 0) path_W_.push_back(truth.X_WB.p);
   if (coverage_ && now_ % kCoveragePeriod == 0) score_coverage();
   if (recorder_ && now_ % kFlushPeriod == 0) recorder_->flush();
   if (recorder_ && now_ > 0 && now_ % kCloudPeriod == 0) write_cloud();
@@ -214,12 +216,12 @@ void Simulation::record() {
 
 void Simulation::score_coverage() {
   const Perception& perception = stack_.perception();
-  coverage_->add_position(physics_.truth().X_WB.p);
   if (!perception.map_2d()) return;
   jobs_.start(perception.cloud_lane(), now_, 0,
-              [this, stamp = now_, map = perception.map_2d(), X_WO = scorer_.X_WO(),
-               distance = scorer_.distance_m(),
+              [this, stamp = now_, path = std::exchange(path_W_, {}), map = perception.map_2d(),
+               X_WO = scorer_.X_WO(), distance = scorer_.distance_m(),
                volume = perception.known_volume_m3()]() -> JobQueue::Delivery {
+                for (const Vec3& p_WB : path) coverage_->add_position(p_WB);
                 const auto points = stack_.perception().cloud().points(covered_points_);
                 covered_points_ += points.size();
                 coverage_->update(stamp, distance, *map, volume, points, X_WO);

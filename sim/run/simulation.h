@@ -113,6 +113,7 @@ class Simulation {
   TrajectoryHash sensor_hash_;
   FlightScorer scorer_;
   std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
+  std::vector<Vec3> path_W_;                  ///< flown since the last score
   std::size_t covered_points_ = 0;            ///< of the cloud, already scored
   double area_fraction_ = 0;
   int collisions_ = 0;

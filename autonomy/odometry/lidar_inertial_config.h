@@ -44,6 +44,8 @@ struct StaticInitialiserConfig {
   double max_gyro_std_radps = 0.02;
   double max_accel_std_mps2 = 0.3;
   double max_gyro_mean_radps = 0.1;
+  double still_rate_radps = 0.005;
+  double still_force_mps2 = 0.1;
   double gyro_bias_std_radps = 1e-4;
   double accel_bias_std_mps2 = 0.05;
   double gravity_std_mps2 = 0.005;
@@ -53,6 +55,10 @@ struct StaticInitialiserConfig {
     f("max_gyro_std_radps", max_gyro_std_radps, "a window that shakes more starts again");
     f("max_accel_std_mps2", max_accel_std_mps2, "a window that shakes more starts again");
     f("max_gyro_mean_radps", max_gyro_mean_radps, "a window that turns faster starts again");
+    f("still_rate_radps", still_rate_radps,
+      "after the start, a scan's mean rate below this is still standstill, as far as force allows");
+    f("still_force_mps2", still_force_mps2,
+      "and its mean specific force changed by less than this");
     f("gyro_bias_std_radps", gyro_bias_std_radps,
       "1 sigma of what changes it later, beside the noise of the mean");
     f("accel_bias_std_mps2", accel_bias_std_mps2,
@@ -99,6 +105,7 @@ struct SurfelMapConfig {
   double finest_edge_m = 0.25;
   int levels = 3;
   int capacity = 250000;
+  double overlap = 0.1;
   int min_points = 6;
   double saturation_weight = 100;
   double max_thickness_ratio = 0.25;
@@ -108,6 +115,9 @@ struct SurfelMapConfig {
     f("finest_edge_m", finest_edge_m, "edge of the finest cells; each level doubles it");
     f("levels", levels, "resolutions");
     f("capacity", capacity, "cells kept per level; the longest unseen make room");
+    f("overlap", overlap,
+      "a cell takes points up to this share of its edge beyond each face; 0 bends planes beside a "
+      "face, garage ATE half as large again");
     f("min_points", min_points, "points that make a surfel");
     f("saturation_weight", saturation_weight,
       "a cell that holds this many points' worth of information at 1 cm noise takes no more");
@@ -117,6 +127,7 @@ struct SurfelMapConfig {
     f.check(finest_edge_m > 0, "finest_edge_m > 0");
     f.check(levels >= 1 && levels <= 4, "1 <= levels <= 4");
     f.check(capacity >= 1000 && capacity <= 4000000, "1000 <= capacity <= 4000000");
+    f.check(overlap >= 0 && overlap < 0.5, "0 <= overlap < 0.5");
     f.check(min_points >= 4, "min_points >= 4");
     f.check(refresh_growth >= 1, "refresh_growth >= 1");
   }
@@ -131,7 +142,7 @@ struct RegistrationConfig {
   double converged_m = 1e-3;
   double gate_sigma = 4.0;
   double robust_sigma = 2.0;
-  double variance_inflation = 25.0;
+  double variance_inflation = 9.0;
 
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
@@ -153,8 +164,8 @@ struct RegistrationConfig {
 struct OdometryHealthConfig {
   int min_matches = 150;
   double min_match_fraction = 0.25;
-  double degenerate_position_std_m = 0.033;
-  double degenerate_rotation_std_rad = 0.008;
+  double degenerate_position_std_m = 0.02;
+  double degenerate_rotation_std_rad = 0.005;
   double lost_position_std_m = 0.5;
   double lost_rotation_std_rad = 0.2;
   double degenerate_silence_s = 0.35;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/so3.h"
 #include "odometry/relocalisation.h"
 
 namespace arex {
@@ -58,6 +59,7 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   accel_scale_ = start->accel_scale;
   stamp_ = correction_stamp_ = scan->end;
   corrected_position_ = filter_.state().p_OB;
+  stood_at_ = filter_.state().X_OB() * filter_.state().X_BL;
   status_ = OdometryStatus::kOk;
   for (const LidarScanPtr& standing : standing_scans_) {
     MotionSegment still;
@@ -81,6 +83,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   for (int pass = 1;; ++pass) {
     ClippedTime clipped;
     const std::vector<MotionSegment> segments = predict_to(scan.end, clipped);
+    if (stood_at_) hold_standstill(scan.end);
     std::vector<ScanPoint> points =
         undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
     const std::vector<ScanPoint> thinned =
@@ -116,6 +119,31 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
     filter_.predict(imu);
   }
   return segments;
+}
+
+void ScanCorrector::hold_standstill(Stamp until) {
+  const auto after = [](Stamp t, const ImuSample& s) { return t < s.stamp; };
+  const auto begin = std::upper_bound(imu_.begin(), imu_.end(), stamp_, after);
+  const auto end = std::upper_bound(begin, imu_.end(), until, after);
+  const NavigationState& x = filter_.state();
+  if (!stands_still({begin, end}, x, accel_scale_, config_.initialiser)) {
+    stood_at_.reset();
+    return;
+  }
+  // Where the map is and what has not moved is the LiDAR; its mounting may be in doubt.
+  using Moved = Eigen::Matrix<double, 9, 1>;
+  const Pose X_OL = x.X_OB() * x.X_BL;
+  Moved moved;
+  moved << so3::Log(X_OL.R.transpose() * stood_at_->R), stood_at_->p - X_OL.p, -x.v_OB;
+  Eigen::Matrix<double, 9, kErrorDim> H = Eigen::Matrix<double, 9, kErrorDim>::Zero();
+  H.block<3, 3>(0, kRotation) = x.X_BL.R.transpose();
+  H.block<3, 3>(0, kExtrinsicRotation).setIdentity();
+  H.block<3, 3>(3, kRotation) = -x.R_OB * so3::hat(x.X_BL.p);
+  H.block<3, 3>(3, kPosition).setIdentity();
+  H.block<3, 3>(3, kExtrinsicPosition) = x.R_OB;
+  H.block<3, 3>(6, kVelocity).setIdentity();
+  const Moved variance = Moved::Constant(kDefinedStd * kDefinedStd);
+  filter_.correct<9>(moved, H, variance.asDiagonal());
 }
 
 void ScanCorrector::judge(const ScanUpdate& update) {

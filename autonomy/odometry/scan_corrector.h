@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "messages/estimates.h"
@@ -49,6 +50,8 @@ class ScanCorrector {
  private:
   void try_start(const LidarScanPtr& scan);
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
+  /// Before take-off the vehicle is where it started: ties the filter to that while it stands.
+  void hold_standstill(Stamp until);
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
   void judge(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
@@ -65,6 +68,7 @@ class ScanCorrector {
   GyroCompletion gyro_;
   std::vector<ImuSample> imu_;
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
+  std::optional<Pose> stood_at_;              ///< X_OL, until it moves for the first time
   Stamp stamp_ = 0;                           ///< of the filter's state
   Stamp correction_stamp_ = 0;
   Vec3 corrected_position_ = Vec3::Zero();

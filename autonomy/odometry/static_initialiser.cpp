@@ -31,8 +31,6 @@ Moments moments(std::span<const ImuSample> samples) {
 }
 
 ErrorMatrix prior_covariance(const StaticInitialiserConfig& sc) {
-  // The start defines O; this only keeps the filter's algebra regular.
-  constexpr double kDefinedStd = 1e-5;
   // Gravity before it is measured.
   constexpr double kGravityPriorStd = 10.0;
   ErrorMatrix P = ErrorMatrix::Zero();
@@ -122,6 +120,16 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
   start.covariance = filter.covariance();
   if (config.estimate_extrinsics) doubt_mounting(config, start.state, start.covariance);
   return start;
+}
+
+bool stands_still(std::span<const ImuSample> samples, const NavigationState& x, double accel_scale,
+                  const StaticInitialiserConfig& config) {
+  if (samples.empty()) return false;
+  const Moments m = moments(samples);
+  const Vec3 rate = m.gyro_mean - x.b_g;
+  const Vec3 force = accel_scale * m.accel_mean - (x.b_a - x.R_OB.transpose() * x.g_O);
+  return m.gyro_std < config.max_gyro_std_radps && m.accel_std < config.max_accel_std_mps2 &&
+         rate.norm() < config.still_rate_radps && force.norm() < config.still_force_mps2;
 }
 
 }  // namespace arex

@@ -16,6 +16,9 @@ struct StaticStart {
   double accel_scale = 1;  ///< G / |mean static a|
 };
 
+/// How well the start defines O, rad, m and m/s, 1 sigma: only keeps the filter's algebra regular.
+inline constexpr double kDefinedStd = 1e-5;
+
 /// Averages a window of standstill. O is placed at B, its z axis against the mean specific force,
 /// B's heading as x: by definition without error. So what an accelerometer bias makes of "down" is
 /// doubt about gravity in O, and tied to the doubt about the bias: gravity and bias are conditioned
@@ -25,5 +28,10 @@ struct StaticStart {
 std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samples,
                                                  const Pose& X_BL,
                                                  const LidarInertialConfig& config);
+
+/// Whether the samples, those of one scan, are those of a vehicle that still stands as in `x`: no
+/// vibration, no rate, no other specific force.
+bool stands_still(std::span<const ImuSample> samples, const NavigationState& x, double accel_scale,
+                  const StaticInitialiserConfig& config);
 
 }  // namespace arex

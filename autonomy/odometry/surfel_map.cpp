@@ -129,19 +129,26 @@ void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> v
     };
     for (std::size_t i = 0; i < std::min(kAhead, points_O.size()); ++i) look_ahead(i);
     for (std::size_t i = 0; i < points_O.size(); ++i) {
-      Slot& slot = obtain(level, keys[i % kAhead]);
-      if (slot.saturated == 0) {
-        add(level, slot, points_O[i].cast<double>(),
-            static_cast<float>(kUnitVariance) / variances_m2[i]);
+      const Vec3 p_O = points_O[i].cast<double>();
+      const float weight = static_cast<float>(kUnitVariance) / variances_m2[i];
+      const Vec3 centre = centre_of(p_O, level.edge_m, level.inverse_edge);
+      add(level, obtain(level, keys[i % kAhead]), centre, p_O, weight);
+      const Vec3 d = p_O - centre;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (std::abs(d[axis]) <= (0.5 - config_.overlap) * level.edge_m) continue;
+        Vec3 beside = centre;
+        beside[axis] += std::copysign(level.edge_m, d[axis]);
+        add(level, obtain(level, key_of(beside, level.inverse_edge)), beside, p_O, weight);
       }
       if (i + kAhead < points_O.size()) look_ahead(i + kAhead);
     }
   }
 }
 
-void SurfelMap::add(Level& level, Slot& slot, const Vec3& p_O, float weight) {
+void SurfelMap::add(Level& level, Slot& slot, const Vec3& centre, const Vec3& p_O, float weight) {
+  if (slot.saturated != 0) return;
   Cell& cell = level.cells[slot.cell];
-  const Vec3f d = (p_O - centre_of(p_O, level.edge_m, level.inverse_edge)).cast<float>();
+  const Vec3f d = (p_O - centre).cast<float>();
   ++cell.count;
   cell.weight += weight;
   for (int i = 0; i < 3; ++i) cell.first[static_cast<std::size_t>(i)] += weight * d[i];

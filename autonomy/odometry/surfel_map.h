@@ -21,7 +21,9 @@ struct SurfelMatch {
 /// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell
 /// into it, and the plane fitted to them (a surfel). A query is answered by the resolution that is
 /// surest of its surface there: a wall by a large cell that averages hundreds of points, a trunk by
-/// the smallest. Memory is fixed: when a level is full the cells longest unseen make room (CLOCK).
+/// the smallest. Cells overlap: were they cut at their faces, the noise that carries points across
+/// a face would bend every plane that runs beside one, the floor first of all. Memory is fixed:
+/// when a level is full the cells longest unseen make room (CLOCK).
 ///
 /// Source: the moments are those of the normal-distributions transform (Biber and Strasser, 2003),
 /// the doubt of a fitted plane that of a linear regression, CLOCK is Corbato's, 1968.
@@ -101,7 +103,7 @@ class SurfelMap {
   Slot& obtain(Level& level, std::uint64_t key);
   static std::uint32_t make_room(Level& level);
   static void erase_slot(Level& level, std::size_t hole);
-  void add(Level& level, Slot& slot, const Vec3& p_O, float weight);
+  void add(Level& level, Slot& slot, const Vec3& centre, const Vec3& p_O, float weight);
   void refresh(const Level& level, const Cell& cell, Surfel& surfel) const;
 
   SurfelMapConfig config_;

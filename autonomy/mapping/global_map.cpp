@@ -75,15 +75,19 @@ void GlobalMap::add_frame(const RayCaster& rays) {
   }
   tree_.apply(changes_);
   for (const BrickChange& change : changes_) band_.note(change);
+}
+
+const HeightBand& GlobalMap::refreshed_band() const {
   band_.refresh([this](const Cell& brick) -> HeightBand::States {
     const std::unique_ptr<Brick>& found = bricks_[slot_of(brick)];
     if (!found) return {};
     return {&found->known, &found->occupied};
   });
+  return band_;
 }
 
 bool GlobalMap::update(Brick& brick, const BrickRays& rays, const BrickMask& inside,
-                       BrickMask& changed) const {
+                       BrickMask& changed) {
   const __m256i hit_step = _mm256_set1_epi16(hit_units_);
   const __m256i miss_step = _mm256_set1_epi16(miss_units_);
   const __m256i low = _mm256_set1_epi16(min_units_);
@@ -92,10 +96,11 @@ bool GlobalMap::update(Brick& brick, const BrickRays& rays, const BrickMask& ins
   for (std::size_t w = 0; w < 8; ++w) {
     const std::uint64_t hit = rays.hit[w] & inside[w];
     const std::uint64_t passed = rays.passed[w] & inside[w];
-    const std::uint64_t seen = hit | passed;
-    if (seen == 0) continue;
-    std::uint64_t negative = 0;
+    const std::uint64_t moved = (hit & ~brick.at_high[w]) | (passed & ~brick.at_low[w]);
+    if (moved == 0) continue;
+    std::uint64_t known = brick.known[w], occupied = brick.occupied[w];
     for (unsigned part = 0; part < 64; part += 16) {
+      if ((moved >> part & 0xffff) == 0) continue;
       auto* const at = reinterpret_cast<__m256i*>(&brick.odds[64 * w + part]);
       __m256i odds = _mm256_load_si256(at);
       const __m256i steps =
@@ -104,12 +109,18 @@ bool GlobalMap::update(Brick& brick, const BrickRays& rays, const BrickMask& ins
       odds = _mm256_adds_epi16(odds, steps);
       odds = _mm256_min_epi16(_mm256_max_epi16(odds, low), high);
       _mm256_store_si256(at, odds);
-      negative |= negative_lanes(odds) << part;
+      const std::uint64_t lanes = std::uint64_t{0xffff} << part;
+      const auto assign = [lanes, part](std::uint64_t& word, std::uint64_t sixteen) {
+        word = (word & ~lanes) | sixteen << part;
+      };
+      known |= (hit | passed) & lanes;
+      assign(occupied, known >> part & ~negative_lanes(odds) & 0xffff);
+      assign(brick.at_low[w], negative_lanes(_mm256_cmpeq_epi16(odds, low)));
+      assign(brick.at_high[w], negative_lanes(_mm256_cmpeq_epi16(odds, high)));
     }
-    const std::uint64_t known = brick.known[w] | seen;
-    const std::uint64_t occupied = known & ~negative;
     changed[w] = (known ^ brick.known[w]) | (occupied ^ brick.occupied[w]);
     any |= changed[w];
+    known_voxels_ += static_cast<std::size_t>(std::popcount(known ^ brick.known[w]));
     brick.known[w] = known;
     brick.occupied[w] = occupied;
   }
@@ -130,14 +141,7 @@ int GlobalMap::state(const Cell& cell) const {
 }
 
 double GlobalMap::known_volume() const {
-  std::size_t voxels = 0;
-  for (const std::unique_ptr<Brick>& brick : bricks_) {
-    if (!brick) continue;
-    for (const std::uint64_t word : brick->known) {
-      voxels += static_cast<std::size_t>(std::popcount(word));
-    }
-  }
-  return static_cast<double>(voxels) * std::pow(resolution_m_, 3);
+  return static_cast<double>(known_voxels_) * std::pow(resolution_m_, 3);
 }
 
 bool GlobalMap::write_octomap(const std::filesystem::path& file) const { return tree_.write(file); }

@@ -8,6 +8,9 @@ namespace {
 
 // Long enough for a LiDAR frame and every device's latency.
 constexpr Stamp kPosesKept = kNanosecondsPerSecond;
+// Nobody in the loop waits for the cloud: its host threads may work at it when they have nothing
+// more urgent.
+constexpr Stamp kCloudDue = kNanosecondsPerSecond;
 
 }  // namespace
 
@@ -84,7 +87,7 @@ void Perception::add_scan(Stamp now, const LidarScanPtr& raw) {
 }
 
 void Perception::add(Stamp now, const RegisteredScan& scan) {
-  jobs_.start(cloud_lane_, now, 0, [this, scan]() -> JobQueue::Delivery {
+  jobs_.schedule(cloud_lane_, now + kCloudDue, [this, scan]() -> JobQueue::Delivery {
     const Vec3f p_OB = scan.p_OB.cast<float>();
     const auto range = static_cast<float>(config_.cloud_range_m);
     std::vector<Vec3f> near;

@@ -169,9 +169,17 @@ void RayCaster::walk(const Vec3& p, const Vec3& d, double length, const Cell& en
     const std::uint32_t u_in = u.index_in(), u_out = u.index_out();
     const std::uint32_t v_in = v.index_in(), v_out = v.index_out();
     const bool u_first = u.ahead() * v.speed < v.ahead() * u.speed;
-    mark(ia | u_in | v_in);
-    mark(ia | (u_first ? u_out : u_in) | (u_first ? v_in : v_out));
-    mark(ia | u_out | v_out);
+    const std::uint32_t in = ia | u_in | v_in, out = ia | u_out | v_out;
+    const std::uint32_t middle = ia | (u_first ? u_out : u_in) | (u_first ? v_in : v_out);
+    if ((in ^ out) >> 6 == 0) {  // the usual case: one word holds all three
+      const std::uint64_t one = 1;
+      passed[in >> 6] |= one << (in & 63U) | one << (middle & 63U) | one << (out & 63U);
+      touched[in >> 9] = 1;
+    } else {
+      mark(in);
+      mark(middle);
+      mark(out);
+    }
     u.advance();
     v.advance();
     at_a += step_a;

@@ -40,7 +40,7 @@ class GlobalMap {
   [[nodiscard]] bool write_octomap(const std::filesystem::path& file) const;
 
  private:
-  struct alignas(32) Brick {
+  struct alignas(64) Brick {  // each mask a cache line
     std::array<std::int16_t, kBrickVoxels> odds{};
     BrickMask known{};
     BrickMask occupied{};
@@ -48,9 +48,16 @@ class GlobalMap {
     BrickMask at_low{};
     BrickMask at_high{};
   };
+  /// What a frame says about a brick.
+  struct Look {
+    Cell at;
+    Brick* brick;
+    BrickMask hit, passed;
+    BrickMask moved;  ///< voxels whose log-odds this changes
+  };
   [[nodiscard]] std::size_t slot_of(const Cell& brick) const;
-  /// @return whether a voxel changed its state; `changed` says which.
-  bool update(Brick& brick, const BrickRays& rays, const BrickMask& inside, BrickMask& changed);
+  void weigh(Look& look) const;
+  void update(const Look& look);
   [[nodiscard]] const HeightBand& refreshed_band() const;
 
   double resolution_m_;

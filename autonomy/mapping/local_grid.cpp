@@ -145,13 +145,19 @@ std::size_t LocalGrid::address(int x, int y, int z) const {
 }
 
 void LocalGrid::forget(const CellBox& cells) {
+  const int length = cells.size().y();
+  if (length <= 0) return;
+  const int first = modulo(cells.low.y(), size_.y());
+  const int before_seam = std::min(length, size_.y() - first);
+  const auto clear = [&](std::size_t begin, int count) {
+    std::fill_n(&evidence_[begin], count, kUnseen);
+    std::fill_n(&frames_[begin], count, std::uint8_t{0});
+  };
   for (int z = cells.low.z(); z < cells.high.z(); ++z) {
     for (int x = cells.low.x(); x < cells.high.x(); ++x) {
-      for (int y = cells.low.y(); y < cells.high.y(); ++y) {
-        const std::size_t i = address(x, y, z);
-        evidence_[i] = kUnseen;
-        frames_[i] = 0;
-      }
+      const std::size_t row = address(x, 0, z);
+      clear(row + static_cast<std::size_t>(first), before_seam);
+      clear(row, length - before_seam);
     }
   }
 }

@@ -1,5 +1,7 @@
 #include "mapping/ray_caster.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -47,10 +49,10 @@ std::uint32_t window_index(const Cell& cell) {
   return at(0) | at(1) | at(2);
 }
 
+/// Undoes the spread of a brick's coordinate.
 int gather_bits(std::uint32_t spread) {
-  std::uint32_t v = 0;
-  for (int i = 0; i < kWindowBits - 3; ++i) v |= ((spread >> (3 * i)) & 1U) << i;
-  return static_cast<int>(v);
+  return static_cast<int>(
+      _pext_u32(spread, static_cast<std::uint32_t>(spread_bits(kWindow / 8 - 1))));
 }
 
 /// One of the two shorter axes during a walk.

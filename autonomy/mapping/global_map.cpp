@@ -21,6 +21,8 @@ Cell round_to_cell(const Vec3& p, double resolution_m) {
   return (p / resolution_m).array().round().cast<int>();
 }
 
+constexpr std::size_t kBatch = 32;  ///< bricks
+
 /// 16 lanes of all ones where the bit is set.
 __m256i spread_to_lanes(std::uint64_t bits) {
   const __m256i bit_of =
@@ -61,41 +63,70 @@ std::size_t GlobalMap::slot_of(const Cell& brick) const {
 void GlobalMap::add_frame(const RayCaster& rays) {
   changes_.clear();
   const CellBox brick_box{brick_low_, brick_low_ + brick_count_};
+  // In batches, each memory access asked for a step before it is needed: the map is larger than the
+  // cache.
+  std::array<Look, kBatch> looks;
+  std::size_t count = 0;
+  const auto take_in = [&] {
+    for (std::size_t i = 0; i < count; ++i) weigh(looks[i]);
+    for (std::size_t i = 0; i < count; ++i) update(looks[i]);
+    count = 0;
+  };
   for (const BrickRays& ray : rays.bricks()) {
     if (!brick_box.contains(ray.brick)) continue;
     std::unique_ptr<Brick>& brick = bricks_[slot_of(ray.brick)];
     if (!brick) brick = std::make_unique<Brick>();
-    BrickChange change;
-    if (update(*brick, ray, mask_inside(ray.brick, box_), change.changed)) {
-      change.brick = ray.brick;
-      change.known = &brick->known;
-      change.occupied = &brick->occupied;
-      changes_.push_back(change);
+    Look& look = looks[count++];
+    look.at = ray.brick;
+    look.brick = brick.get();
+    const BrickMask inside = mask_inside(ray.brick, box_);
+    for (std::size_t w = 0; w < inside.size(); ++w) {
+      look.hit[w] = ray.hit[w] & inside[w];
+      look.passed[w] = ray.passed[w] & inside[w];
     }
+    for (const BrickMask* mask :
+         {&brick->known, &brick->occupied, &brick->at_low, &brick->at_high}) {
+      __builtin_prefetch(mask);
+    }
+    if (count == kBatch) take_in();
   }
+  take_in();
   tree_.apply(changes_);
   for (const BrickChange& change : changes_) band_.note(change);
+}
+
+void GlobalMap::weigh(Look& look) const {
+  const Brick& brick = *look.brick;
+  for (std::size_t w = 0; w < look.moved.size(); ++w) {
+    look.moved[w] = (look.hit[w] & ~brick.at_high[w]) | (look.passed[w] & ~brick.at_low[w]);
+    if (static_cast<std::uint32_t>(look.moved[w]) != 0) __builtin_prefetch(&brick.odds[64 * w], 1);
+    if (look.moved[w] >> 32 != 0) __builtin_prefetch(&brick.odds[64 * w + 32], 1);
+  }
+}
+
+const HeightBand& GlobalMap::refreshed_band() const {
   band_.refresh([this](const Cell& brick) -> HeightBand::States {
     const std::unique_ptr<Brick>& found = bricks_[slot_of(brick)];
     if (!found) return {};
     return {&found->known, &found->occupied};
   });
+  return band_;
 }
 
-bool GlobalMap::update(Brick& brick, const BrickRays& rays, const BrickMask& inside,
-                       BrickMask& changed) const {
+void GlobalMap::update(const Look& look) {
+  Brick& brick = *look.brick;
+  BrickChange change{look.at, &brick.known, &brick.occupied, {}};
   const __m256i hit_step = _mm256_set1_epi16(hit_units_);
   const __m256i miss_step = _mm256_set1_epi16(miss_units_);
   const __m256i low = _mm256_set1_epi16(min_units_);
   const __m256i high = _mm256_set1_epi16(max_units_);
   std::uint64_t any = 0;
   for (std::size_t w = 0; w < 8; ++w) {
-    const std::uint64_t hit = rays.hit[w] & inside[w];
-    const std::uint64_t passed = rays.passed[w] & inside[w];
-    const std::uint64_t seen = hit | passed;
-    if (seen == 0) continue;
-    std::uint64_t negative = 0;
+    const std::uint64_t hit = look.hit[w], passed = look.passed[w], moved = look.moved[w];
+    if (moved == 0) continue;
+    std::uint64_t known = brick.known[w], occupied = brick.occupied[w];
     for (unsigned part = 0; part < 64; part += 16) {
+      if ((moved >> part & 0xffff) == 0) continue;
       auto* const at = reinterpret_cast<__m256i*>(&brick.odds[64 * w + part]);
       __m256i odds = _mm256_load_si256(at);
       const __m256i steps =
@@ -104,16 +135,22 @@ bool GlobalMap::update(Brick& brick, const BrickRays& rays, const BrickMask& ins
       odds = _mm256_adds_epi16(odds, steps);
       odds = _mm256_min_epi16(_mm256_max_epi16(odds, low), high);
       _mm256_store_si256(at, odds);
-      negative |= negative_lanes(odds) << part;
+      const std::uint64_t lanes = std::uint64_t{0xffff} << part;
+      const auto assign = [lanes, part](std::uint64_t& word, std::uint64_t sixteen) {
+        word = (word & ~lanes) | sixteen << part;
+      };
+      known |= (hit | passed) & lanes;
+      assign(occupied, known >> part & ~negative_lanes(odds) & 0xffff);
+      assign(brick.at_low[w], negative_lanes(_mm256_cmpeq_epi16(odds, low)));
+      assign(brick.at_high[w], negative_lanes(_mm256_cmpeq_epi16(odds, high)));
     }
-    const std::uint64_t known = brick.known[w] | seen;
-    const std::uint64_t occupied = known & ~negative;
-    changed[w] = (known ^ brick.known[w]) | (occupied ^ brick.occupied[w]);
-    any |= changed[w];
+    change.changed[w] = (known ^ brick.known[w]) | (occupied ^ brick.occupied[w]);
+    any |= change.changed[w];
+    known_voxels_ += static_cast<std::size_t>(std::popcount(known ^ brick.known[w]));
     brick.known[w] = known;
     brick.occupied[w] = occupied;
   }
-  return any != 0;
+  if (any != 0) changes_.push_back(change);
 }
 
 int GlobalMap::state(const Cell& cell) const {
@@ -130,14 +167,7 @@ int GlobalMap::state(const Cell& cell) const {
 }
 
 double GlobalMap::known_volume() const {
-  std::size_t voxels = 0;
-  for (const std::unique_ptr<Brick>& brick : bricks_) {
-    if (!brick) continue;
-    for (const std::uint64_t word : brick->known) {
-      voxels += static_cast<std::size_t>(std::popcount(word));
-    }
-  }
-  return static_cast<double>(voxels) * std::pow(resolution_m_, 3);
+  return static_cast<double>(known_voxels_) * std::pow(resolution_m_, 3);
 }
 
 bool GlobalMap::write_octomap(const std::filesystem::path& file) const { return tree_.write(file); }

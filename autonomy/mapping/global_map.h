@@ -29,9 +29,9 @@ class GlobalMap {
 
   /// -1 unknown, 0 free, 1 occupied; unknown outside the bounds.
   [[nodiscard]] int state(const Cell& cell) const;
-  [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return band_.map(); }
+  [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return refreshed_band().map(); }
   /// Height of the ground under a point, m in O; NaN where none was seen nearby (kAbsolute: 0).
-  [[nodiscard]] double ground_at(const Vec2& p) const { return band_.ground_at(p); }
+  [[nodiscard]] double ground_at(const Vec2& p) const { return refreshed_band().ground_at(p); }
   [[nodiscard]] const StateTree& tree() const { return tree_; }
   /// Volume known so far, m^3.
   [[nodiscard]] double known_volume() const;
@@ -40,15 +40,25 @@ class GlobalMap {
   [[nodiscard]] bool write_octomap(const std::filesystem::path& file) const;
 
  private:
-  struct alignas(32) Brick {
+  struct alignas(64) Brick {  // each mask a cache line
     std::array<std::int16_t, kBrickVoxels> odds{};
     BrickMask known{};
     BrickMask occupied{};
+    // Voxels at a clamp: one more look of the same kind moves nothing, so it costs nothing.
+    BrickMask at_low{};
+    BrickMask at_high{};
+  };
+  /// What a frame says about a brick.
+  struct Look {
+    Cell at;
+    Brick* brick;
+    BrickMask hit, passed;
+    BrickMask moved;  ///< voxels whose log-odds this changes
   };
   [[nodiscard]] std::size_t slot_of(const Cell& brick) const;
-  /// @return whether a voxel changed its state; `changed` says which.
-  bool update(Brick& brick, const BrickRays& rays, const BrickMask& inside,
-              BrickMask& changed) const;
+  void weigh(Look& look) const;
+  void update(const Look& look);
+  [[nodiscard]] const HeightBand& refreshed_band() const;
 
   double resolution_m_;
   CellBox box_;
@@ -57,7 +67,8 @@ class GlobalMap {
   std::int16_t hit_units_, miss_units_, min_units_, max_units_;
   std::vector<std::unique_ptr<Brick>> bricks_;  ///< null: nothing seen
   StateTree tree_;
-  HeightBand band_;
+  mutable HeightBand band_;  ///< brought up to date when it is asked for
+  std::size_t known_voxels_ = 0;
   std::vector<BrickChange> changes_;
 };
 

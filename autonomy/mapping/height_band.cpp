@@ -35,6 +35,7 @@ HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const
 
 void HeightBand::note(const BrickChange& change) {
   const Cell at = change.brick - brick_low_;
+  dirty_ = true;
   tiles_[static_cast<std::size_t>(at.y() * brick_count_.x() + at.x())].dirty = true;
 }
 
@@ -54,7 +55,7 @@ void HeightBand::find_ground(Tile& tile) {
   int below = 0;  // occupied in the layer below
   for (int k = 0; k < brick_count_.z() && found == kNoGround; ++k) {
     const BrickMask* const occupied = column_[static_cast<std::size_t>(k)].occupied;
-    if (occupied == nullptr) {
+    if (occupied == nullptr || *occupied == BrickMask{}) {
       below = 0;
       continue;
     }

@@ -40,8 +40,12 @@ class HeightBand {
   /// Brings the map up to date. `states_of(brick)` gives a brick's States.
   template <class StatesOf>
   void refresh(const StatesOf& states_of) {
-    for (std::size_t t = 0; t < tiles_.size(); ++t) {
-      if (tiles_[t].dirty) load(t, states_of);
+    if (!dirty_) return;
+    dirty_ = false;
+    for (std::size_t t = 0; t < tiles_.size() && reference_ == BandReference::kGround; ++t) {
+      if (!tiles_[t].dirty) continue;
+      load(t, states_of);
+      find_ground(tiles_[t]);
     }
     if (ground_changed_) spread_ground();
     for (std::size_t t = 0; t < tiles_.size(); ++t) {
@@ -68,7 +72,6 @@ class HeightBand {
     for (int k = 0; k < brick_count_.z(); ++k, ++brick.z()) {
       column_[static_cast<std::size_t>(k)] = states_of(brick);
     }
-    if (reference_ == BandReference::kGround) find_ground(tiles_[tile]);
   }
   void find_ground(Tile& tile);
   void spread_ground();
@@ -86,6 +89,7 @@ class HeightBand {
   Cell brick_low_, brick_count_;
   std::vector<Tile> tiles_;
   std::vector<States> column_;  ///< bricks of the tile at hand
+  bool dirty_ = false;          ///< some tile is
   bool ground_changed_ = false;
   OccupancyMap2D map_;
 };

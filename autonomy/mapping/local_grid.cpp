@@ -31,50 +31,91 @@ int modulo(int a, int n) {
   return m < 0 ? m + n : m;
 }
 
-/// Flags of `n` cells of a row.
-void make_flags(const std::int8_t* evidence, const std::uint8_t* frames, int n,
-                std::uint8_t* flags) {
-  for (int i = 0; i < n; ++i) {
-    const bool held = (frames[i] & kFrameCount) != 0;
-    const bool remembered = (frames[i] & kConfirmed) != 0 && evidence[i] >= 0;
-    const bool free = evidence[i] < 0 && evidence[i] != kUnseen;
-    const bool occupied = held || remembered;
-    flags[i] = static_cast<std::uint8_t>((occupied ? GridView::kOccupied : 0) |
-                                         (occupied || free ? GridView::kKnown : 0));
+constexpr std::size_t kBlock = 32;  ///< cells handled at a time
+
+/// What `n` cells in a row are, a bit each. Reads whole blocks, up to kBlock - 1 cells more.
+void classify(const std::int8_t* evidence, const std::uint8_t* frames, int n,
+              std::uint64_t* occupied, std::uint64_t* known) {
+  const __m256i zero = _mm256_setzero_si256();
+  const __m256i unseen = _mm256_set1_epi8(kUnseen);
+  const __m256i count = _mm256_set1_epi8(static_cast<char>(kFrameCount));
+  for (int i = 0; i < n; i += 2 * static_cast<int>(kBlock)) {
+    std::uint64_t full = 0, seen = 0;
+    for (int half = 0; half < 64 && i + half < n; half += static_cast<int>(kBlock)) {
+      const auto load = [at = i + half](const auto* row) {
+        return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(row + at));
+      };
+      const auto bits = [](__m256i sign) {
+        return static_cast<std::uint64_t>(static_cast<std::uint32_t>(_mm256_movemask_epi8(sign)));
+      };
+      const __m256i e = load(evidence), f = load(frames);
+      const std::uint64_t held = bits(_mm256_cmpgt_epi8(_mm256_and_si256(f, count), zero));
+      // kConfirmed is the sign bit of its byte, as the evidence's sign is of its.
+      const std::uint64_t remembered = bits(_mm256_andnot_si256(e, f));
+      const std::uint64_t free = bits(_mm256_andnot_si256(_mm256_cmpeq_epi8(e, unseen), e));
+      full |= (held | remembered) << half;
+      seen |= (held | remembered | free) << half;
+    }
+    if (n - i < 64) {
+      const std::uint64_t inside = (std::uint64_t{1} << (n - i)) - 1;
+      full &= inside;
+      seen &= inside;
+    }
+    occupied[i / 64] = full;
+    known[i / 64] = seen;
   }
 }
 
-/// Bit i of the row = bit 0 of flags[i].
-void pack_row(const std::uint8_t* flags, int n, std::uint64_t* row) {
-  int i = 0;
-  for (; i + 64 <= n; i += 64) {
-    const auto load = [&](int at) {
-      const __m256i v = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(flags + at));
-      return static_cast<std::uint32_t>(_mm256_movemask_epi8(_mm256_slli_epi16(v, 7)));
-    };
-    row[i / 64] = load(i) | static_cast<std::uint64_t>(load(i + 32)) << 32;
+/// In a cube of 4^3 voxels the rows along y: mask[x + 4 z].
+struct CubeRows {
+  std::array<std::uint64_t, 16> mask{};
+  constexpr CubeRows() {
+    for (std::uint64_t k = 0; k < 16; ++k) {
+      for (std::uint64_t y = 0; y < 4; ++y) {
+        mask[k] |= std::uint64_t{1} << morton(k % 4, y, k / 4);
+      }
+    }
   }
-  if (i < n) row[i / 64] = 0;
-  for (; i < n; ++i) row[i / 64] |= static_cast<std::uint64_t>(flags[i] & 1U) << (i % 64);
+};
+constexpr CubeRows kRows;
+
+/// Copies a row of `n` bits so that bit `first` comes to lie at 0.
+void rotate_row(const std::vector<std::uint64_t>& in, int n, int first, std::uint64_t* out) {
+  const int words = static_cast<int>(in.size());
+  const auto at = [&](int k) {
+    return k >= 0 && k < words ? in[static_cast<std::size_t>(k)] : std::uint64_t{0};
+  };
+  const auto word_at = [&](int bit) {  // 64 bits from `bit` on, zeros around the row
+    const int w = bit >> 6, s = bit & 63;
+    return s == 0 ? at(w) : at(w) >> s | at(w + 1) << (64 - s);
+  };
+  for (int k = 0; k < words; ++k) out[k] = word_at(64 * k + first) | word_at(64 * k + first - n);
+  if (n % 64 != 0) out[words - 1] &= (std::uint64_t{1} << (n % 64)) - 1;
 }
 
-/// flags[i] |= flag where bit i of the row is set.
-void merge_row(const std::uint64_t* row, int n, std::uint8_t flag, std::uint8_t* flags) {
+/// The flags of `n` cells from their bits.
+void write_flags(const std::uint64_t* occupied, const std::uint64_t* inflated,
+                 const std::uint64_t* known, int n, std::uint8_t* flags) {
   const __m256i byte_of = _mm256_setr_epi8(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2,
                                            2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3);
   const __m256i bit_of = _mm256_set1_epi64x(static_cast<long long>(0x8040201008040201ULL));
-  const __m256i value = _mm256_set1_epi8(static_cast<char>(flag));
-  int i = 0;
-  for (; i + 32 <= n; i += 32) {
-    const auto bits = static_cast<std::uint32_t>(row[i / 64] >> (i % 64));
-    if (bits == 0) continue;
-    const __m256i spread = _mm256_shuffle_epi8(_mm256_set1_epi32(static_cast<int>(bits)), byte_of);
-    const __m256i set = _mm256_cmpeq_epi8(_mm256_and_si256(spread, bit_of), bit_of);
-    auto* const at = reinterpret_cast<__m256i*>(flags + i);
-    _mm256_storeu_si256(at, _mm256_or_si256(_mm256_loadu_si256(at), _mm256_and_si256(set, value)));
-  }
-  for (; i < n; ++i) {
-    if ((row[i / 64] >> (i % 64) & 1U) != 0) flags[i] |= flag;
+  for (int i = 0; i < n; i += static_cast<int>(kBlock)) {
+    const auto spread = [&](const std::uint64_t* row, std::uint8_t flag) {
+      const auto bits = static_cast<int>(static_cast<std::uint32_t>(row[i / 64] >> (i % 64)));
+      const __m256i bytes = _mm256_shuffle_epi8(_mm256_set1_epi32(bits), byte_of);
+      const __m256i set = _mm256_cmpeq_epi8(_mm256_and_si256(bytes, bit_of), bit_of);
+      return _mm256_and_si256(set, _mm256_set1_epi8(static_cast<char>(flag)));
+    };
+    const __m256i all = _mm256_or_si256(
+        spread(occupied, GridView::kOccupied),
+        _mm256_or_si256(spread(inflated, GridView::kInflated), spread(known, GridView::kKnown)));
+    if (n - i >= static_cast<int>(kBlock)) {
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(flags + i), all);
+    } else {
+      alignas(kBlock) std::array<std::uint8_t, kBlock> rest;
+      _mm256_store_si256(reinterpret_cast<__m256i*>(rest.data()), all);
+      std::copy_n(rest.begin(), n - i, flags + i);
+    }
   }
 }
 
@@ -91,10 +132,11 @@ LocalGrid::LocalGrid(const LocalGridConfig& config, double inflation_m, double r
       decay_units_(static_cast<int>(
           std::lround(config.decay_per_s * to_seconds(kDecayPeriod) * kUnitsPerLogOdds))),
       low_(-size_ / 2),
-      evidence_(static_cast<std::size_t>(size_.prod()), kUnseen),
+      evidence_(static_cast<std::size_t>(size_.prod()) + kBlock, kUnseen),
       frames_(evidence_.size(), 0),
       inflation_(inflation_m, resolution_m, config.inflation_shape),
       occupied_(size_.x(), size_.z(), size_.y()),
+      known_(occupied_),
       inflated_(occupied_) {}
 
 std::size_t LocalGrid::address(int x, int y, int z) const {
@@ -103,13 +145,19 @@ std::size_t LocalGrid::address(int x, int y, int z) const {
 }
 
 void LocalGrid::forget(const CellBox& cells) {
+  const int length = cells.size().y();
+  if (length <= 0) return;
+  const int first = modulo(cells.low.y(), size_.y());
+  const int before_seam = std::min(length, size_.y() - first);
+  const auto clear = [&](std::size_t begin, int count) {
+    std::fill_n(&evidence_[begin], count, kUnseen);
+    std::fill_n(&frames_[begin], count, std::uint8_t{0});
+  };
   for (int z = cells.low.z(); z < cells.high.z(); ++z) {
     for (int x = cells.low.x(); x < cells.high.x(); ++x) {
-      for (int y = cells.low.y(); y < cells.high.y(); ++y) {
-        const std::size_t i = address(x, y, z);
-        evidence_[i] = kUnseen;
-        frames_[i] = 0;
-      }
+      const std::size_t row = address(x, 0, z);
+      clear(row + static_cast<std::size_t>(first), before_seam);
+      clear(row, length - before_seam);
     }
   }
 }
@@ -191,15 +239,53 @@ std::size_t LocalGrid::voxel_in_brick(std::size_t voxel) const {
 }
 
 void LocalGrid::pass(const BrickRays& rays, const BrickMask& inside) {
-  for (std::size_t w = 0; w < inside.size(); ++w) {
-    for (std::uint64_t bits = rays.passed[w] & inside[w]; bits != 0; bits &= bits - 1) {
-      const std::size_t i =
-          voxel_in_brick(64 * w + static_cast<std::size_t>(std::countr_zero(bits)));
-      const int before = evidence_[i] == kUnseen ? 0 : evidence_[i];
-      const int after = std::max(before + miss_units_, min_units_);
-      evidence_[i] = static_cast<std::int8_t>(after);
-      frames_[i] = static_cast<std::uint8_t>(frames_[i] & (after < 0 ? kFrameCount : 0xff));
+  // Row by row along y, as the cells lie in memory; only at the seam of the array one by one.
+  const bool in_a_row = brick_address_[1][7] == brick_address_[1][0] + 7;
+  for (std::size_t w : {0U, 1U, 4U, 5U}) {
+    const std::uint64_t near = rays.passed[w] & inside[w];
+    const std::uint64_t far = rays.passed[w + 2] & inside[w + 2];
+    if ((near | far) == 0) continue;
+    for (std::size_t k = 0; k < 16; ++k) {
+      const std::size_t x = k % 4, z = k / 4;
+      const std::uint64_t row = kRows.mask[k];
+      const auto bits = static_cast<unsigned>(_pext_u64(near, row) | _pext_u64(far, row) << 4);
+      if (bits == 0) continue;
+      const std::size_t begin = brick_address_[0][x + 4 * (w & 1)] + brick_address_[2][z + (w & 4)];
+      if (in_a_row) {
+        pass_eight(begin + brick_address_[1][0], bits);
+        continue;
+      }
+      for (unsigned rest = bits; rest != 0; rest &= rest - 1) {
+        pass_one(begin + brick_address_[1][static_cast<std::size_t>(std::countr_zero(rest))]);
+      }
     }
+  }
+}
+
+void LocalGrid::pass_one(std::size_t i) {
+  const int before = evidence_[i] == kUnseen ? 0 : evidence_[i];
+  const int after = std::max(before + miss_units_, min_units_);
+  evidence_[i] = static_cast<std::int8_t>(after);
+  frames_[i] = static_cast<std::uint8_t>(frames_[i] & (after < 0 ? kFrameCount : 0xff));
+}
+
+/// pass_one() of those of eight cells in a row whose bit is set.
+void LocalGrid::pass_eight(std::size_t first, unsigned bits) {
+  auto* const evidence = reinterpret_cast<__m128i*>(&evidence_[first]);
+  auto* const frames = reinterpret_cast<__m128i*>(&frames_[first]);
+  const __m128i chosen =
+      _mm_cvtsi64_si128(static_cast<long long>(_pdep_u64(bits, 0x0101010101010101) * 0xff));
+  const __m128i before = _mm_loadl_epi64(evidence);
+  const __m128i known = _mm_andnot_si128(_mm_cmpeq_epi8(before, _mm_set1_epi8(kUnseen)), before);
+  const __m128i after =
+      _mm_max_epi8(_mm_adds_epi8(known, _mm_set1_epi8(static_cast<char>(miss_units_))),
+                   _mm_set1_epi8(static_cast<char>(min_units_)));
+  _mm_storel_epi64(evidence, _mm_blendv_epi8(before, after, chosen));
+  const __m128i refuted =
+      _mm_and_si128(_mm_and_si128(after, chosen), _mm_set1_epi8(static_cast<char>(kConfirmed)));
+  const __m128i held = _mm_loadl_epi64(frames);
+  if (_mm_testz_si128(refuted, held) == 0) {
+    _mm_storel_epi64(frames, _mm_andnot_si128(refuted, held));
   }
 }
 
@@ -224,12 +310,13 @@ void LocalGrid::hit(const BrickRays& rays, const BrickMask& inside, Held& frame)
 
 void LocalGrid::decay_until(Stamp stamp) {
   if (decay_units_ == 0) return;
+  const auto cells = static_cast<std::size_t>(size_.prod());
   const std::int64_t due = stamp / (kDecayPeriod / kDecaySlices);
   const std::int64_t slices = std::clamp<std::int64_t>(due - decayed_slices_, 0, kDecaySlices);
   for (std::int64_t s = due - slices; s < due; ++s) {
     const auto slice = static_cast<std::size_t>(s % kDecaySlices);
-    const std::size_t begin = evidence_.size() * slice / kDecaySlices;
-    const std::size_t end = evidence_.size() * (slice + 1) / kDecaySlices;
+    const std::size_t begin = cells * slice / kDecaySlices;
+    const std::size_t end = cells * (slice + 1) / kDecaySlices;
     for (std::size_t i = begin; i < end; ++i) {
       const int e = evidence_[i];
       const int size = e < 0 ? -e : e;
@@ -257,7 +344,7 @@ std::shared_ptr<GridSnapshot> LocalGrid::free_snapshot() {
     return snapshot;
   }
   snapshots_.push_back(std::make_shared<GridSnapshot>());
-  snapshots_.back()->cells.resize(evidence_.size());
+  snapshots_.back()->cells.resize(static_cast<std::size_t>(size_.prod()));
   return snapshots_.back();
 }
 
@@ -266,27 +353,21 @@ std::shared_ptr<const GridSnapshot> LocalGrid::snapshot() {
   out->stamp = stamp_;
   out->centre = centre_;
   const int length = size_.y();
-  const int wrap = length - modulo(low_.y(), length);  // cells of a row before the array's end
-  const auto row_begin = [&](int h, int w) {
-    return static_cast<std::ptrdiff_t>(h * size_.x() + w) * length;
-  };
+  const int first = modulo(low_.y(), length);
+  std::vector<std::uint64_t> occupied(static_cast<std::size_t>(occupied_.words)), known(occupied);
   for (int h = 0; h < size_.z(); ++h) {
     for (int w = 0; w < size_.x(); ++w) {
-      std::uint8_t* const flags = out->cells.data() + row_begin(h, w);
-      const std::size_t first = address(low_.x() + w, low_.y(), low_.z() + h);
-      const std::size_t second = first + static_cast<std::size_t>(wrap - length);
-      make_flags(&evidence_[first], &frames_[first], wrap, flags);
-      if (wrap < length) {
-        make_flags(&evidence_[second], &frames_[second], length - wrap, flags + wrap);
-      }
-      pack_row(flags, length, occupied_.row(h, w));
+      const std::size_t row = address(low_.x() + w, 0, low_.z() + h);
+      classify(&evidence_[row], &frames_[row], length, occupied.data(), known.data());
+      rotate_row(occupied, length, first, occupied_.row(h, w));
+      rotate_row(known, length, first, known_.row(h, w));
     }
   }
   inflation_.apply(occupied_, inflated_);
+  std::uint8_t* flags = out->cells.data();
   for (int h = 0; h < size_.z(); ++h) {
-    for (int w = 0; w < size_.x(); ++w) {
-      merge_row(inflated_.row(h, w), length, GridView::kInflated,
-                out->cells.data() + row_begin(h, w));
+    for (int w = 0; w < size_.x(); ++w, flags += length) {
+      write_flags(occupied_.row(h, w), inflated_.row(h, w), known_.row(h, w), length, flags);
     }
   }
   out->view.cells = out->cells.data();

@@ -61,6 +61,8 @@ class LocalGrid {
 
   void release(const Held& frame);
   void pass(const BrickRays& rays, const BrickMask& inside);
+  void pass_one(std::size_t cell);
+  void pass_eight(std::size_t first, unsigned bits);
   void hit(const BrickRays& rays, const BrickMask& inside, Held& frame);
   void decay_until(Stamp stamp);
   void forget(const CellBox& cells);
@@ -74,7 +76,7 @@ class LocalGrid {
   Cell size_;
   int hit_units_, miss_units_, min_units_, max_units_, decay_units_;
   Cell low_;                           ///< lattice cell of the box's lower corner
-  std::vector<std::int8_t> evidence_;  ///< log-odds in units; kUnseen
+  std::vector<std::int8_t> evidence_;  ///< log-odds in units; kUnseen; a block longer, as frames_
   std::vector<std::uint8_t> frames_;   ///< frames held that hit it, and kConfirmed
   std::deque<Held> lidar_;
   Held depth_;
@@ -84,6 +86,7 @@ class LocalGrid {
   std::array<std::array<std::size_t, 8>, 3> brick_address_{};  ///< of the brick at hand
   Inflation inflation_;
   BitGrid occupied_;
+  BitGrid known_;
   BitGrid inflated_;
   std::vector<std::shared_ptr<GridSnapshot>> snapshots_;  ///< all that were made
 };

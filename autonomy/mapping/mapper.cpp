@@ -1,5 +1,7 @@
 #include "mapping/mapper.h"
 
+#include <atomic>
+
 #include "mapping/map_files.h"
 
 namespace arex {
@@ -8,25 +10,37 @@ Mapper::Mapper(const LocalGridConfig& local, const GlobalMapConfig& global, doub
                double inflation_m, const VehicleConfig& vehicle)
     : config_(local),
       vehicle_(vehicle),
+      resolution_m_(resolution_m),
       range_m_(global.range_m),
-      rays_(resolution_m),
       local_(local, inflation_m, resolution_m),
       global_(global, resolution_m) {}
 
-void Mapper::integrate(const RegisteredScan& scan) {
+std::shared_ptr<RayCaster> Mapper::free_rays() {
+  for (const std::shared_ptr<RayCaster>& rays : rays_) {
+    if (rays.use_count() != 1) continue;
+    // The last reader let go of them on its own thread.
+    std::atomic_thread_fence(std::memory_order_acquire);
+    return rays;
+  }
+  return rays_.emplace_back(std::make_shared<RayCaster>(resolution_m_));
+}
+
+std::shared_ptr<const RayCaster> Mapper::integrate_locally(const RegisteredScan& scan) {
   local_.recentre(scan.p_OB);
   const CellBox local = local_.box();
   const CellBox& global = global_.box();
+  const std::shared_ptr<RayCaster> rays = free_rays();
   cast_frame(scan, range_m_, vehicle_,
-             {local.low.cwiseMin(global.low), local.high.cwiseMax(global.high)}, rays_);
-  local_.add_frame(rays_, LocalGrid::FrameKind::kLidar, scan.stamp);
-  global_.add_frame(rays_);
+             {local.low.cwiseMin(global.low), local.high.cwiseMax(global.high)}, *rays);
+  local_.add_frame(*rays, LocalGrid::FrameKind::kLidar, scan.stamp);
+  return rays;
 }
 
 void Mapper::integrate(const RegisteredDepth& depth) {
   if (!config_.use_depth || !depth.image) return;
-  cast_frame(depth, config_, vehicle_, local_.box(), rays_);
-  local_.add_frame(rays_, LocalGrid::FrameKind::kDepth, depth.image->stamp);
+  const std::shared_ptr<RayCaster> rays = free_rays();
+  cast_frame(depth, config_, vehicle_, local_.box(), *rays);
+  local_.add_frame(*rays, LocalGrid::FrameKind::kDepth, depth.image->stamp);
 }
 
 bool Mapper::write(const std::filesystem::path& folder) const {

@@ -9,14 +9,20 @@
 
 namespace arex {
 
-/// Both maps, fed by one ray casting per LiDAR frame. Used from one job lane, never concurrently;
-/// snapshots may be read from anywhere.
+/// Both maps, fed by one ray casting per LiDAR frame. The local grid's calls belong to one job
+/// lane, the global map's to one (it may be another); snapshots may be read from anywhere.
 class Mapper {
  public:
   Mapper(const LocalGridConfig& local, const GlobalMapConfig& global, double resolution_m,
          double inflation_m, const VehicleConfig& vehicle);
 
-  void integrate(const RegisteredScan& scan);
+  /// Takes a LiDAR frame into the local grid. @return its rays, for the global map
+  [[nodiscard]] std::shared_ptr<const RayCaster> integrate_locally(const RegisteredScan& scan);
+  /// The rest of the frame. It may run beside the local grid's next frames, on one thread at a time
+  /// and frame by frame.
+  void integrate_globally(const RayCaster& rays) { global_.add_frame(rays); }
+  /// Both.
+  void integrate(const RegisteredScan& scan) { integrate_globally(*integrate_locally(scan)); }
   /// Into the local grid only; without `use_depth` nothing.
   void integrate(const RegisteredDepth& depth);
   /// After a jump of the pose: the local grid starts anew.
@@ -29,10 +35,13 @@ class Mapper {
   [[nodiscard]] bool write(const std::filesystem::path& folder) const;
 
  private:
+  [[nodiscard]] std::shared_ptr<RayCaster> free_rays();
+
   LocalGridConfig config_;
   VehicleConfig vehicle_;
+  double resolution_m_;
   double range_m_;
-  RayCaster rays_;
+  std::vector<std::shared_ptr<RayCaster>> rays_;  ///< all that were made
   LocalGrid local_;
   GlobalMap global_;
 };

@@ -1,12 +1,14 @@
 #include "mapping/point_cloud_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace arex {
 namespace {
 
 constexpr std::size_t kFirstSlots = 1U << 16;
+constexpr std::size_t kBatch = 32;  ///< points
 // A voxel's mean settles; more points would only wear out its count.
 constexpr std::uint32_t kMaxCount = 1000;
 
@@ -49,28 +51,52 @@ void PointCloudMap::grow() {
 }
 
 void PointCloudMap::insert(std::span<const Vec3f> points_O) {
+  // In batches, each memory access asked for a step before it is needed: the map is larger than the
+  // cache.
+  struct Keyed {
+    std::uint64_t key;
+    Vec3f p;
+  };
+  std::array<Keyed, kBatch> batch;
+  std::size_t count = 0;
+  const auto take_in = [&] {
+    const std::size_t mask = slots_.size() - 1;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t at = slots_[hash_of(batch[i].key) & mask];
+      if (at != 0) __builtin_prefetch(&voxels_[at - 1], 1);
+    }
+    for (std::size_t i = 0; i < count; ++i) insert(batch[i].key, batch[i].p);
+    count = 0;
+  };
   for (const Vec3f& p : points_O) {
     if (!p.allFinite()) continue;
     const std::uint64_t key = key_of(p, config_.voxel_m);
-    std::size_t slot = slot_of(key);
-    if (slots_[slot] == 0) {
-      if (voxels_.size() >= static_cast<std::size_t>(config_.max_points)) {
-        ++refused_;
-        continue;
-      }
-      if (2 * (voxels_.size() + 1) > slots_.size()) {
-        grow();
-        slot = slot_of(key);
-      }
-      voxels_.push_back({key, p, 1});
-      slots_[slot] = static_cast<std::uint32_t>(voxels_.size());
-      continue;
-    }
-    Voxel& voxel = voxels_[slots_[slot] - 1];
-    if (voxel.count >= kMaxCount) continue;
-    ++voxel.count;
-    voxel.mean += (p - voxel.mean) / static_cast<float>(voxel.count);
+    __builtin_prefetch(&slots_[hash_of(key) & (slots_.size() - 1)]);
+    batch[count++] = {key, p};
+    if (count == kBatch) take_in();
   }
+  take_in();
+}
+
+void PointCloudMap::insert(std::uint64_t key, const Vec3f& p) {
+  std::size_t slot = slot_of(key);
+  if (slots_[slot] == 0) {
+    if (voxels_.size() >= static_cast<std::size_t>(config_.max_points)) {
+      ++refused_;
+      return;
+    }
+    if (2 * (voxels_.size() + 1) > slots_.size()) {
+      grow();
+      slot = slot_of(key);
+    }
+    voxels_.push_back({key, p, 1});
+    slots_[slot] = static_cast<std::uint32_t>(voxels_.size());
+    return;
+  }
+  Voxel& voxel = voxels_[slots_[slot] - 1];
+  if (voxel.count >= kMaxCount) return;
+  ++voxel.count;
+  voxel.mean += (p - voxel.mean) / static_cast<float>(voxel.count);
 }
 
 std::vector<Vec3f> PointCloudMap::points(std::size_t first) const {

@@ -40,6 +40,7 @@ class PointCloudMap {
     Vec3f mean = Vec3f::Zero();
     std::uint32_t count = 0;
   };
+  void insert(std::uint64_t key, const Vec3f& p);
   [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;
   void grow();
 

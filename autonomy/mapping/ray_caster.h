@@ -20,8 +20,10 @@ struct BrickRays {
 ///
 /// Rays walk along their longest axis from one cell boundary to the next in fixed point (2^-55 of a
 /// cell); between two boundaries they cross at most one boundary of each other axis, so that three
-/// marks, of which some may coincide, cover the step without a branch. The marks are bits of a
-/// window of 512^3 cells that is addressed modulo its size and cleared by touched bricks only.
+/// marks, of which some may coincide, cover the step without a branch. Four steps are taken at a
+/// time, inside the words' four cells along that axis, where they meet four words at most. The
+/// marks are bits of a window of 512^3 cells that is addressed modulo its size and cleared by
+/// touched bricks only.
 class RayCaster {
  public:
   explicit RayCaster(double resolution_m);

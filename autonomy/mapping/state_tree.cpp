@@ -1,9 +1,10 @@
 #include "mapping/state_tree.h"
 
+#include <immintrin.h>
 #include <octomap/OcTree.h>
 
 #include <algorithm>
-#include <bit>
+#include <deque>
 #include <fstream>
 #include <vector>
 
@@ -18,116 +19,176 @@ struct Keyed {
   const BrickChange* change;
 };
 
+std::uint64_t key_of(const Cell& brick) {
+  const auto at = [&](int axis, std::uint64_t mask) {
+    return _pdep_u64(static_cast<std::uint64_t>(brick[axis] + kBrickOffset), mask);
+  };
+  return at(0, 0x9249249249249249) | at(1, 0x2492492492492492) | at(2, 0x4924924924924924);
+}
+
+using Children = std::array<octomap::AbstractOcTreeNode*, 8>;
+
+/// A node whose children's pointers are kept by its owner.
+struct Node : octomap::OcTreeNode {
+  Node() = default;
+  ~Node() { children = nullptr; }
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  void adopt(Children& below) { children = below.data(); }
+};
+
+/// What a cube of voxels amounts to in the tree.
+struct Subtree {
+  Node* node = nullptr;  ///< null: nothing known
+  bool occupied = false;
+  std::uint32_t nodes = 0;
+};
+
+/// A node with its eight children.
+struct Cube {
+  Node node;
+  Children below{};
+  std::array<std::uint32_t, 8> nodes{};  ///< of each child's subtree
+  std::uint8_t occupied = 0;             ///< children that are
+
+  Cube() { node.adopt(below); }
+  void set(unsigned child, const Subtree& subtree) {
+    below[child] = subtree.node;
+    nodes[child] = subtree.nodes;
+    const unsigned bit = 1U << child;
+    occupied = static_cast<std::uint8_t>(subtree.occupied ? occupied | bit : occupied & ~bit);
+  }
+};
+
 }  // namespace
 
-/// OcTree with access to its root.
+/// OcTree that owns its nodes. Cubes of 2^3 voxels are shared: there are but 3^8 of them. Larger
+/// ones stay allocated once made; where a cube is uniform, its parent points to one of two leaves
+/// instead, which is what OctoMap calls pruned.
 class StateTree::Tree : public octomap::OcTree {
  public:
-  using octomap::OcTree::OcTree;
+  Tree(double resolution_m, double min_probability, double max_probability) : OcTree(resolution_m) {
+    setClampingThresMin(min_probability);
+    setClampingThresMax(max_probability);
+    leaves_[0].setLogOdds(clamping_thres_min);
+    leaves_[1].setLogOdds(clamping_thres_max);
+    make_bytes();
+  }
+  ~Tree() override {
+    root = nullptr;
+    tree_size = 0;
+  }
+  Tree(const Tree&) = delete;
+  Tree& operator=(const Tree&) = delete;
 
   void apply(std::span<const Keyed> changes) {
     if (changes.empty()) return;
-    if (root == nullptr) {
-      root = new octomap::OcTreeNode();
-      ++tree_size;
-      root_is_new_ = true;
-    }
-    apply(root, root_is_new_, 0, changes);
-    root_is_new_ = false;
+    const Subtree all = apply(top_, 0, changes);
+    root = all.node;
+    tree_size = all.nodes;
+    size_changed = true;
   }
 
  private:
-  using Node = octomap::OcTreeNode;
+  /// 2^3 voxels in one of their states.
+  struct Byte : Cube {
+    Subtree subtree;
+  };
+  /// 8^3 voxels and their eight cubes of 4^3.
+  struct Brick : Cube {
+    std::array<Cube, 8> words;
+  };
+  /// A node above the bricks.
+  struct Branch : Cube {
+    std::array<Branch*, 8> branches{};
+    std::array<Brick*, 8> bricks{};
+  };
 
-  /// The child, made if it is not there. A node without children that is not new is pruned: its
-  /// voxels all have its state.
-  Node* child_of(Node* node, bool& is_new, unsigned child) {
-    if (!nodeHasChildren(node) && !is_new) expandNode(node);
-    is_new = !nodeChildExists(node, child);
-    return is_new ? createNodeChild(node, child) : getNodeChild(node, child);
-  }
-  void refresh(Node* node) {
-    if (!pruneNode(node)) node->updateOccupancyChildren();
-  }
-  /// refresh() of a node whose voxels are at hand: no look at the children unless they merge.
-  void settle(Node* node, bool all_known, bool any_occupied, bool all_occupied) {
-    if (all_known && any_occupied == all_occupied && pruneNode(node)) return;
-    node->setLogOdds(value(any_occupied));
-  }
-  [[nodiscard]] float value(bool occupied) const {
-    return occupied ? clamping_thres_max : clamping_thres_min;
-  }
+  [[nodiscard]] Subtree leaf(bool occupied) { return {&leaves_[occupied ? 1 : 0], occupied, 1}; }
 
-  /// Levels above the bricks.
-  void apply(Node* node, bool is_new, unsigned depth, std::span<const Keyed> changes) {
-    if (depth == kBrickDepth) {
-      apply_brick(node, is_new, *changes.front().change);
-      return;
+  /// The cube as its parent sees it.
+  Subtree close(Cube& cube) {
+    for (const bool occupied : {false, true}) {
+      const octomap::AbstractOcTreeNode* const same = &leaves_[occupied ? 1 : 0];
+      if (std::all_of(cube.below.begin(), cube.below.end(),
+                      [same](const auto* child) { return child == same; })) {
+        return leaf(occupied);
+      }
     }
+    const bool occupied = cube.occupied != 0;
+    cube.node.setLogOdds(occupied ? clamping_thres_max : clamping_thres_min);
+    std::uint32_t nodes = 1;
+    for (const std::uint32_t n : cube.nodes) nodes += n;
+    return {&cube.node, occupied, nodes};
+  }
+
+  Subtree apply(Branch& branch, unsigned depth, std::span<const Keyed> changes) {
     const unsigned shift = 3 * (kBrickDepth - 1 - depth);
     while (!changes.empty()) {
-      const std::uint64_t child = changes.front().key >> shift;
+      const std::uint64_t prefix = changes.front().key >> shift;
       std::size_t count = 1;
-      while (count < changes.size() && changes[count].key >> shift == child) ++count;
-      bool child_is_new = is_new;
-      Node* const next = child_of(node, child_is_new, static_cast<unsigned>(child & 7U));
-      is_new = false;
-      apply(next, child_is_new, depth + 1, changes.first(count));
+      while (count < changes.size() && changes[count].key >> shift == prefix) ++count;
+      const auto child = static_cast<unsigned>(prefix & 7U);
+      if (depth + 1 == kBrickDepth) {
+        branch.set(child, apply(made(branch.bricks[child], bricks_), *changes.front().change));
+      } else {
+        branch.set(child,
+                   apply(made(branch.branches[child], branches_), depth + 1, changes.first(count)));
+      }
       changes = changes.subspan(count);
     }
-    refresh(node);
+    return close(branch);
   }
 
-  void apply_brick(Node* node, bool is_new, const BrickChange& change) {
+  Subtree apply(Brick& brick, const BrickChange& change) {
     for (unsigned w = 0; w < 8; ++w) {
-      if (change.changed[w] == 0) continue;
-      bool child_is_new = is_new;
-      Node* const child = child_of(node, child_is_new, w);
-      is_new = false;
-      apply_word(child, child_is_new, (*change.known)[w], (*change.occupied)[w], change.changed[w]);
+      std::uint64_t changed = change.changed[w];
+      if (changed == 0) continue;
+      std::uint64_t known = (*change.known)[w], occupied = (*change.occupied)[w];
+      for (unsigned b = 0; b < 8; ++b, known >>= 8, occupied >>= 8, changed >>= 8) {
+        if ((changed & 0xff) == 0) continue;
+        brick.words[w].set(b, bytes_[state_of_byte(known & 0xff, occupied & 0xff)].subtree);
+      }
+      brick.set(w, close(brick.words[w]));
     }
-    refresh(node);
+    return close(brick);
   }
 
-  /// A cube of 4^3 voxels: a node whose children are bytes.
-  void apply_word(Node* node, bool is_new, std::uint64_t known, std::uint64_t occupied,
-                  std::uint64_t changed) {
-    const bool all_known = ~known == 0, any_occupied = occupied != 0, all_occupied = ~occupied == 0;
-    for (unsigned b = 0; b < 8; ++b, known >>= 8, occupied >>= 8, changed >>= 8) {
-      if ((changed & 0xff) == 0) continue;
-      bool child_is_new = is_new;
-      Node* const child = child_of(node, child_is_new, b);
-      is_new = false;
-      apply_byte(child, child_is_new, static_cast<unsigned>(known & 0xff),
-                 static_cast<unsigned>(occupied & 0xff), static_cast<unsigned>(changed & 0xff));
-    }
-    settle(node, all_known, any_occupied, all_occupied);
+  template <class T>
+  static T& made(T*& pointer, std::deque<T>& all) {
+    if (pointer == nullptr) pointer = &all.emplace_back();
+    return *pointer;
   }
 
-  /// A cube of 2^3 voxels: a node whose children are leaves.
-  void apply_byte(Node* node, bool is_new, unsigned known, unsigned occupied, unsigned changed) {
-    const bool uniform = known == 0xff && (occupied == 0 || occupied == 0xff);
-    if (uniform && !nodeHasChildren(node)) {
-      node->setLogOdds(value(occupied != 0));
-      return;
+  /// The digits of the eight voxels' states to base 3: unknown 0, free 1, occupied 2.
+  [[nodiscard]] std::size_t state_of_byte(std::uint64_t known, std::uint64_t occupied) const {
+    return base3_[known] + base3_[occupied];
+  }
+  void make_bytes() {
+    for (std::size_t bits = 0; bits < base3_.size(); ++bits) {
+      for (std::size_t i = 0, power = 1; i < 8; ++i, power *= 3) {
+        if ((bits >> i & 1U) != 0) base3_[bits] = static_cast<std::uint16_t>(base3_[bits] + power);
+      }
     }
-    for (unsigned v = 0; v < 8; ++v) {
-      if ((changed >> v & 1U) == 0) continue;
-      bool leaf_is_new = is_new;
-      child_of(node, leaf_is_new, v)->setLogOdds(value((occupied >> v & 1U) != 0));
-      is_new = false;
+    for (std::size_t state = 0; state < bytes_.size(); ++state) {
+      Byte& byte = bytes_[state];
+      for (std::size_t i = 0, rest = state; i < 8; ++i, rest /= 3) {
+        if (rest % 3 != 0) byte.set(static_cast<unsigned>(i), leaf(rest % 3 == 2));
+      }
+      if (state != 0) byte.subtree = close(byte);
     }
-    settle(node, known == 0xff, occupied != 0, occupied == 0xff);
   }
 
-  bool root_is_new_ = false;
+  std::array<Node, 2> leaves_;  ///< free, occupied
+  std::array<std::uint16_t, 256> base3_{};
+  std::vector<Byte> bytes_ = std::vector<Byte>(6561);  ///< 3^8
+  Branch top_;
+  std::deque<Branch> branches_;
+  std::deque<Brick> bricks_;
 };
 
 StateTree::StateTree(double resolution_m, double min_probability, double max_probability)
-    : tree_(std::make_unique<Tree>(resolution_m)) {
-  tree_->setClampingThresMin(min_probability);
-  tree_->setClampingThresMax(max_probability);
-}
+    : tree_(std::make_unique<Tree>(resolution_m, min_probability, max_probability)) {}
 StateTree::~StateTree() = default;
 StateTree::StateTree(StateTree&&) noexcept = default;
 
@@ -135,10 +196,7 @@ void StateTree::apply(std::span<BrickChange> changes) {
   std::vector<Keyed> keyed;
   keyed.reserve(changes.size());
   for (const BrickChange& change : changes) {
-    const auto at = [&](int axis) {
-      return static_cast<std::uint64_t>(change.brick[axis] + kBrickOffset);
-    };
-    keyed.push_back({morton(at(0), at(1), at(2)), &change});
+    keyed.push_back({key_of(change.brick), &change});
   }
   std::sort(keyed.begin(), keyed.end(),
             [](const Keyed& a, const Keyed& b) { return a.key < b.key; });

@@ -36,9 +36,7 @@ void JobQueue::drain() {
   std::unique_lock lock(mutex_);
   while (!pending_.empty()) {
     const JobPtr job = pending_.front();
-    while (!job->done) {
-      if (!run_one(lock, job->lane)) job_done_.wait(lock);
-    }
+    finish(lock, *job);
     pending_.erase(pending_.begin());
     if (job->error) std::rethrow_exception(job->error);
   }
@@ -81,9 +79,9 @@ void JobQueue::enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visi
   }
 }
 
-void JobQueue::run(Lane lane, const std::function<void()>& work) {
+void JobQueue::run(const std::function<Lane()>& work) {
   const double begin = thread_seconds();
-  work();
+  const Lane lane = work();
   const auto seconds = static_cast<float>(thread_seconds() - begin);
   const std::lock_guard lock(mutex_);
   lanes_.at(lane).seconds.push_back(seconds);
@@ -94,10 +92,7 @@ void JobQueue::advance(Stamp now) {
     std::unique_lock lock(mutex_);
     if (pending_.empty() || pending_.front()->visible_at > now) return;
     const JobPtr job = pending_.front();
-    // Help instead of idling: the caller's thread is one of the host threads.
-    while (!job->done) {
-      if (!run_one(lock, job->lane)) job_done_.wait(lock);
-    }
+    finish(lock, *job);
     pending_.erase(pending_.begin());
     lock.unlock();
     if (job->error) std::rethrow_exception(job->error);
@@ -128,9 +123,8 @@ void JobQueue::execute(Job& job) {
   job.seconds = static_cast<float>(thread_seconds() - begin);
 }
 
-// Runs the next job of a lane on this thread. @return false if there is none or it is being run.
-bool JobQueue::run_one(std::unique_lock<std::mutex>& lock, Lane lane) {
-  if (lanes_[lane].running || lanes_[lane].waiting.empty()) return false;
+// Runs the next job of a lane on this thread.
+void JobQueue::run_one(std::unique_lock<std::mutex>& lock, Lane lane) {
   const JobPtr job = lanes_[lane].waiting.front();
   lanes_[lane].waiting.pop_front();
   lanes_[lane].running = true;
@@ -142,21 +136,36 @@ bool JobQueue::run_one(std::unique_lock<std::mutex>& lock, Lane lane) {
   job->done = true;
   job_done_.notify_all();
   if (!lanes_[lane].waiting.empty()) work_available_.notify_one();
-  return true;
+}
+
+// The lane whose next job will be waited for first.
+std::optional<JobQueue::Lane> JobQueue::next_lane() const {
+  const auto next = std::find_if(pending_.begin(), pending_.end(), [&](const JobPtr& job) {
+    const LaneState& lane = lanes_[job->lane];
+    return !lane.running && !lane.waiting.empty() && lane.waiting.front() == job;
+  });
+  return next == pending_.end() ? std::nullopt : std::optional((*next)->lane);
+}
+
+// Waits for the first of the pending jobs. The caller's thread is one of the host threads: while
+// another one runs that job it takes the next.
+void JobQueue::finish(std::unique_lock<std::mutex>& lock, const Job& job) {
+  while (!job.done) {
+    if (const auto lane = next_lane()) {
+      run_one(lock, *lane);
+    } else {
+      job_done_.wait(lock);
+    }
+  }
 }
 
 void JobQueue::run_worker() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
-    // The job that will be waited for first is run first.
-    const auto next = std::find_if(pending_.begin(), pending_.end(), [&](const JobPtr& job) {
-      const LaneState& lane = lanes_[job->lane];
-      return !lane.running && !lane.waiting.empty() && lane.waiting.front() == job;
-    });
-    if (next == pending_.end()) {
-      work_available_.wait(lock);
+    if (const auto lane = next_lane()) {
+      run_one(lock, *lane);
     } else {
-      run_one(lock, (*next)->lane);
+      work_available_.wait(lock);
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -51,8 +52,9 @@ class JobQueue {
   /// out while it exposes the next frame. It does not occupy the lane in simulated time.
   void schedule(Lane lane, Stamp visible_at, Work work);
 
-  /// Does light work of a lane at once on the caller's thread, only to have it timed with the rest.
-  void run(Lane lane, const std::function<void()>& work);
+  /// Does light work at once on the caller's thread, only to have it timed with the rest: by the
+  /// lane that `work` returns.
+  void run(const std::function<Lane()>& work);
 
   /// Delivers every result that is visible at `now`, in order of visibility, then of start.
   /// Rethrows what a job threw.
@@ -89,7 +91,9 @@ class JobQueue {
 
   void enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visible_at, Work work);
   static void execute(Job& job);
-  bool run_one(std::unique_lock<std::mutex>& lock, Lane lane);
+  void run_one(std::unique_lock<std::mutex>& lock, Lane lane);
+  [[nodiscard]] std::optional<Lane> next_lane() const;
+  void finish(std::unique_lock<std::mutex>& lock, const Job& job);
   void run_worker();
 
   std::vector<LaneState> lanes_;

@@ -8,6 +8,7 @@ Navigator::Navigator(const PlanningConfig& config, double force_lag_s, JobQueue&
       force_lag_s_(force_lag_s),
       jobs_(jobs),
       planner_lane_(jobs.add_lane("planner")),
+      replan_lane_(jobs.add_lane("replan")),
       guide_lane_(jobs.add_lane("guide")),
       machine_(config.replan, config.local, config.yaw, seed),
       check_period_(from_seconds(1 / config.replan.check_rate_hz)) {}
@@ -56,7 +57,11 @@ TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& 
                                      const Odometry& odometry, Stamp now) {
   if (grid && now >= next_check_) {
     next_check_ = now + check_period_;
-    jobs_.run(planner_lane_, [&] { machine_.tick(grid->view, odometry, now); });
+    jobs_.run([&] {
+      const int before = machine_.plans() + machine_.failures();
+      machine_.tick(grid->view, odometry, now);
+      return machine_.plans() + machine_.failures() == before ? planner_lane_ : replan_lane_;
+    });
   }
   const bool guided = config_.guide.mode == GuideMode::kAstar && map && has_target_;
   if (guided && progress_ == MotionProgress::kUnderWay && now >= next_guide_) {

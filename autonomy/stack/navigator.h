@@ -46,7 +46,8 @@ class Navigator {
   PlanningConfig config_;
   double force_lag_s_;
   JobQueue& jobs_;
-  JobQueue::Lane planner_lane_;
+  JobQueue::Lane planner_lane_;  ///< checks without a plan
+  JobQueue::Lane replan_lane_;   ///< checks that made a plan, or tried to
   JobQueue::Lane guide_lane_;
   ReplanMachine machine_;
   Stamp check_period_;

@@ -8,6 +8,11 @@ namespace {
 
 // Long enough for a LiDAR frame and every device's latency.
 constexpr Stamp kPosesKept = kNanosecondsPerSecond;
+// Where nobody asks for its picture, the host's threads have until the next frame or so.
+constexpr Stamp kGlobalMapDue = kNanosecondsPerSecond / 5;
+// Nobody in the loop waits for the cloud: its host threads may work at it when they have nothing
+// more urgent.
+constexpr Stamp kCloudDue = kNanosecondsPerSecond;
 
 }  // namespace
 
@@ -20,6 +25,7 @@ Perception::Perception(const StackConfig& config, JobQueue& jobs)
               config.planning.inflation_m, config.vehicle),
       cloud_(config.mapping.cloud),
       mapping_lane_(jobs.add_lane("mapping")),
+      global_map_lane_(jobs.add_lane("global_map")),
       cloud_lane_(jobs.add_lane("cloud")) {}
 
 void Perception::add_odometry(const Odometry& odometry) {
@@ -84,7 +90,7 @@ void Perception::add_scan(Stamp now, const LidarScanPtr& raw) {
 }
 
 void Perception::add(Stamp now, const RegisteredScan& scan) {
-  jobs_.start(cloud_lane_, now, 0, [this, scan]() -> JobQueue::Delivery {
+  jobs_.schedule(cloud_lane_, now + kCloudDue, [this, scan]() -> JobQueue::Delivery {
     const Vec3f p_OB = scan.p_OB.cast<float>();
     const auto range = static_cast<float>(config_.cloud_range_m);
     std::vector<Vec3f> near;
@@ -97,21 +103,30 @@ void Perception::add(Stamp now, const RegisteredScan& scan) {
   if (!config_.enabled) return;
   const bool with_map_2d = now >= next_map_2d_;
   if (with_map_2d) next_map_2d_ = now + from_seconds(1 / config_.map_2d_rate_hz);
+  // The local grid has to be there in time; the global map follows in its own lane.
   jobs_.start(mapping_lane_, now, from_seconds(config_.latency_s),
               [this, scan, with_map_2d]() -> JobQueue::Delivery {
-                mapper_.integrate(scan);
-                auto grid = mapper_.snapshot();
-                auto map_2d = with_map_2d
-                                  ? std::make_shared<const OccupancyMap2D>(mapper_.occupancy_2d())
-                                  : nullptr;
-                const double volume = map_2d ? mapper_.global().known_volume() : 0.0;
-                return [this, grid = std::move(grid), map_2d = std::move(map_2d), volume] {
+                return [this, rays = mapper_.integrate_locally(scan), grid = mapper_.snapshot(),
+                        with_map_2d, stamp = scan.stamp] {
                   grid_ = grid;
-                  if (!map_2d) return;
-                  map_2d_ = map_2d;
-                  known_volume_m3_ = volume;
+                  add_globally(rays, with_map_2d, stamp);
                 };
               });
+}
+
+void Perception::add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d,
+                              Stamp stamp) {
+  jobs_.schedule(global_map_lane_, with_map_2d ? stamp : stamp + kGlobalMapDue,
+                 [this, rays, with_map_2d]() -> JobQueue::Delivery {
+                   mapper_.integrate_globally(*rays);
+                   if (!with_map_2d) return nullptr;
+                   return
+                       [this, volume = mapper_.global().known_volume(),
+                        map_2d = std::make_shared<const OccupancyMap2D>(mapper_.occupancy_2d())] {
+                         map_2d_ = map_2d;
+                         known_volume_m3_ = volume;
+                       };
+                 });
 }
 
 void Perception::add_depth(Stamp now, const DepthImagePtr& depth) {

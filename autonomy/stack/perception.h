@@ -36,7 +36,6 @@ class Perception {
 
   // What follows belongs to its lane: read it in a job of that lane, or when the jobs are drained.
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
-  [[nodiscard]] JobQueue::Lane mapping_lane() const { return mapping_lane_; }
   [[nodiscard]] const PointCloudMap& cloud() const { return cloud_; }
   [[nodiscard]] JobQueue::Lane cloud_lane() const { return cloud_lane_; }
 
@@ -47,6 +46,7 @@ class Perception {
   };
   [[nodiscard]] Pose pose_at(Stamp stamp) const;
   void add(Stamp now, const RegisteredScan& scan);
+  void add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d, Stamp stamp);
 
   MappingConfig config_;
   Pose X_BL_;
@@ -54,7 +54,8 @@ class Perception {
   JobQueue& jobs_;
   Mapper mapper_;
   PointCloudMap cloud_;
-  JobQueue::Lane mapping_lane_;
+  JobQueue::Lane mapping_lane_;  ///< the mapper's local grid
+  JobQueue::Lane global_map_lane_;
   JobQueue::Lane cloud_lane_;
   std::deque<StampedPose> poses_;
   Stamp next_map_2d_ = 0;

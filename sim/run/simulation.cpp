@@ -13,6 +13,7 @@ constexpr Stamp kStatusPeriod = 5 * kTick;  // 200 Hz: what the autopilot tells,
 constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leaves it
 constexpr Stamp kPathPeriod = 100 * kTick;      // 10 Hz: revisits and turns
 constexpr Stamp kCoveragePeriod = 1000 * kTick;
+constexpr Stamp kScoreDue = 1000 * kTick;  // the flight does not wait for what is scored or written
 constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
 constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
 
@@ -217,24 +218,25 @@ void Simulation::record() {
 void Simulation::score_coverage() {
   const Perception& perception = stack_.perception();
   if (!perception.map_2d()) return;
-  jobs_.start(perception.cloud_lane(), now_, 0,
-              [this, stamp = now_, path = std::exchange(path_W_, {}), map = perception.map_2d(),
-               X_WO = scorer_.X_WO(), distance = scorer_.distance_m(),
-               volume = perception.known_volume_m3()]() -> JobQueue::Delivery {
-                for (const Vec3& p_WB : path) coverage_->add_position(p_WB);
-                const auto points = stack_.perception().cloud().points(covered_points_);
-                covered_points_ += points.size();
-                coverage_->update(stamp, distance, *map, volume, points, X_WO);
-                return [this, row = coverage_->latest()] { area_fraction_ = row.area_fraction; };
-              });
+  jobs_.schedule(perception.cloud_lane(), now_ + kScoreDue,
+                 [this, stamp = now_, path = std::exchange(path_W_, {}), map = perception.map_2d(),
+                  X_WO = scorer_.X_WO(), distance = scorer_.distance_m(),
+                  volume = perception.known_volume_m3()]() -> JobQueue::Delivery {
+                   for (const Vec3& p_WB : path) coverage_->add_position(p_WB);
+                   const auto points = stack_.perception().cloud().points(covered_points_);
+                   covered_points_ += points.size();
+                   coverage_->update(stamp, distance, *map, volume, points, X_WO);
+                   return [this, row = coverage_->latest()] { area_fraction_ = row.area_fraction; };
+                 });
 }
 
 void Simulation::write_cloud() {
   // Behind the insertions of the same lane, so that the file is the map of this moment.
-  jobs_.start(stack_.perception().cloud_lane(), now_, 0, [this]() -> JobQueue::Delivery {
-    recorder_->write_cloud(stack_.perception().cloud().points());
-    return nullptr;
-  });
+  jobs_.schedule(stack_.perception().cloud_lane(), now_ + kScoreDue,
+                 [this]() -> JobQueue::Delivery {
+                   recorder_->write_cloud(stack_.perception().cloud().points());
+                   return nullptr;
+                 });
 }
 
 void Simulation::judge() {

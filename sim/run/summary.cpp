@@ -79,7 +79,7 @@ ordered_json coverage_json(const std::optional<CoverageResult>& coverage) {
 ordered_json planner_json(const FlightResult& result) {
   if (result.plans == 0) return nullptr;
   for (const TimingRow& row : result.timing) {
-    if (row.module != "planner") continue;
+    if (row.module != "replan") continue;
     return {{"replans", result.plans},
             {"median_ms", rounded(row.median_ms)},
             {"p99_ms", rounded(row.p99_ms)},

@@ -9,6 +9,8 @@ namespace {
 
 using worlds::CollisionShape;
 
+constexpr double kRounding = 1e-4;  ///< far above that of the search, m
+
 // Points on a shape's hull in its own frame: corners of boxes, two rims of cylinders and capsules.
 std::vector<Vec3> hull_points(const CollisionShape& shape) {
   constexpr int kRimPoints = 12;
@@ -43,10 +45,19 @@ ClearanceMeter::ClearanceMeter(const Scene& scene, const Airframe& airframe) : s
 }
 
 double ClearanceMeter::measure(const Truth& truth, double max_m) {
+  // It grows by no more than the points have moved: that bounds the search.
   double clearance = max_m;
+  if (!samples_.empty() && samples_.back() < max_m) {
+    double moved2 = 0;
+    for (const Vec3& p_B : points_B_) {
+      moved2 = std::max(moved2, (truth.X_WB * p_B - X_WB_ * p_B).squaredNorm());
+    }
+    clearance = std::min(max_m, samples_.back() + std::sqrt(moved2) + kRounding);
+  }
   for (const Vec3& p_B : points_B_) {
     clearance = scene_.distance_to_surface(truth.X_WB * p_B, clearance);
   }
+  X_WB_ = truth.X_WB;
   samples_.push_back(clearance);
   return clearance;
 }

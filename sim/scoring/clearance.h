@@ -31,6 +31,7 @@ class ClearanceMeter {
   const Scene& scene_;
   std::vector<Vec3> points_B_;
   std::vector<double> samples_;
+  Pose X_WB_;  ///< of the newest sample
 };
 
 }  // namespace arex::sim

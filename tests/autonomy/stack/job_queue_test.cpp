@@ -104,6 +104,26 @@ TEST(JobQueue, ScheduledDeviceWorkKeepsTheCallersTime) {
   }
 }
 
+TEST(JobQueue, TheCallerTakesOtherLanesJobsWhileItWaits) {
+  // Both threads are needed at once: the job that is waited for ends when the other one has run,
+  // which is due much later.
+  JobQueue jobs(2);
+  const auto urgent = jobs.add_lane("urgent"), idle = jobs.add_lane("idle");
+  std::atomic<bool> ran{false};
+  bool seen = false;
+  jobs.start(urgent, 0, kMs, [&]() -> JobQueue::Delivery {
+    for (int i = 0; i < 5000 && !ran; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return [&seen, together = ran.load()] { seen = together; };
+  });
+  jobs.schedule(idle, 1000 * kMs, [&]() -> JobQueue::Delivery {
+    ran = true;
+    return nullptr;
+  });
+  jobs.advance(kMs);
+  EXPECT_TRUE(seen);
+}
+
 TEST(JobQueue, RethrowsWhatAJobThrew) {
   for (const int threads : {1, 3}) {
     JobQueue jobs(threads);

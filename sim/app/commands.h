@@ -47,6 +47,12 @@ struct RenderArguments {
 };
 int render(const RenderArguments& arguments);
 
+struct ReportArguments {
+  std::vector<std::string> folders;  ///< run folders and sweeps
+  bool runs = false;                 ///< also of every run of a sweep
+};
+int report(const ReportArguments& arguments);
+
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);
 

@@ -59,6 +59,16 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = render(arguments); });
 }
 
+void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("report", "write report.html beside recorded data");
+  command
+      ->add_option("folders", arguments.folders,
+                   "run folders, folders of sweeps; several are compared")
+      ->required();
+  command->add_flag("--runs", arguments.runs, "also a report of every run of a sweep");
+  command->callback([&] { exit_code = report(arguments); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -69,12 +79,14 @@ int main(int argc, char** argv) {
   WorldArguments world_arguments;
   PatternArguments pattern_arguments;
   RenderArguments render_arguments;
+  ReportArguments report_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   add_run(app, run_arguments, exit_code);
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
   add_render(app, render_arguments, exit_code);
+  add_report(app, report_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "app/commands.h"
 #include "config/config.h"
@@ -33,6 +34,14 @@ void report_comparison(const std::vector<fs::path>& folders, const fs::path& dir
   std::printf("%s (%zu runs)\n", file.c_str(), results.folders.size());
 }
 
+// By what sweep.json calls it, otherwise by its folder.
+std::string sweep_title(const fs::path& folder) {
+  const auto bytes = sim::read_bytes(folder / "sweep.json");
+  const auto json = nlohmann::json::parse(bytes.value_or(""), nullptr, false);
+  if (!json.is_object()) return "Sweep " + folder.filename().string();
+  return "Sweep " + json.value("name", folder.filename().string());
+}
+
 // The deepest folder that holds all of them.
 fs::path common_parent(const std::vector<fs::path>& folders) {
   fs::path common = folders.front().parent_path();
@@ -62,7 +71,7 @@ int report(const ReportArguments& arguments) {
   }
   for (const fs::path& folder : folders) {
     if (sim::is_sweep_folder(folder)) {
-      report_comparison({folder}, folder, "sweep " + folder.filename().string(), arguments.runs);
+      report_comparison({folder}, folder, sweep_title(folder), arguments.runs);
     } else {
       report_run(folder);
     }

@@ -11,7 +11,7 @@ export interface Line {
   /** Second scale, on the right. */
   right?: boolean;
   /** An edge of a band: not drawn itself, not in the legend. */
-  faint?: boolean;
+  edge?: boolean;
 }
 
 export interface Band {
@@ -29,13 +29,14 @@ export interface ChartSpec {
   /** Charts over the same axis share their cursor. */
   sync?: string;
   zero?: boolean;
+  height?: number;
   points?: boolean;
   /** Names of x = 0, 1, ... instead of numbers. */
   names?: string[];
   onPick?: (x: number) => void;
 }
 
-const HEIGHT = 190;
+const HEIGHT = 200;
 const charts: { plot: uPlot; box: HTMLElement }[] = [];
 let mark: number | null = null;
 
@@ -55,7 +56,7 @@ export function clearCharts(): void {
 
 function fit({ plot, box }: { plot: uPlot; box: HTMLElement }): void {
   const width = Math.floor(box.clientWidth);
-  if (width > 0 && width !== plot.width) plot.setSize({ width, height: HEIGHT });
+  if (width > 0 && width !== plot.width) plot.setSize({ width, height: plot.height });
 }
 
 const resized = new ResizeObserver((entries) => {
@@ -117,6 +118,31 @@ function markPlugin(): uPlot.Plugin {
   };
 }
 
+/** The interval at each point, which a band shows only between them. */
+function whiskerPlugin(bands: Band[]): uPlot.Plugin {
+  return {
+    hooks: {
+      draw: (plot) => {
+        plot.ctx.save();
+        plot.ctx.lineWidth = 1.5 * devicePixelRatio;
+        for (const band of bands) {
+          plot.ctx.strokeStyle = themeColour(band.colour);
+          plot.data[0].forEach((at, i) => {
+            const ends = [plot.data[band.low + 1][i], plot.data[band.high + 1][i]];
+            if (ends[0] === null || ends[1] === null || ends[0] === undefined || ends[1] === undefined) return;
+            const x = plot.valToPos(at, 'x', true);
+            plot.ctx.beginPath();
+            plot.ctx.moveTo(x, plot.valToPos(ends[0], 'y', true));
+            plot.ctx.lineTo(x, plot.valToPos(ends[1], 'y', true));
+            plot.ctx.stroke();
+          });
+        }
+        plot.ctx.restore();
+      },
+    },
+  };
+}
+
 function scaleRange(zero: boolean): uPlot.Range.Function {
   return (_plot, min, max) => {
     if (min === null || max === null) return [0, 1];
@@ -132,15 +158,16 @@ function pointRange(_plot: uPlot, min: number, max: number): uPlot.Range.MinMax 
   return [min - room, max + room];
 }
 
-function series(line: Line, points: boolean): uPlot.Series {
+function series(line: Line, spec: ChartSpec): uPlot.Series {
   return {
     label: line.label,
     scale: line.right ? 'right' : 'y',
-    class: line.faint ? 'faint' : undefined,
-    stroke: () => (line.faint ? 'transparent' : themeColour(line.colour)),
-    width: line.faint ? 0 : 1.5,
+    class: line.edge ? 'edge' : undefined,
+    stroke: () => (line.edge ? 'transparent' : themeColour(line.colour)),
+    width: 1.5,
+    paths: spec.names ? () => null : undefined, // nothing lies between two names
     spanGaps: false,
-    points: { show: points && !line.faint, size: 6, fill: () => themeColour(line.colour) },
+    points: { show: (spec.points ?? false) && !line.edge, size: 6, fill: () => themeColour(line.colour) },
     value: (_plot, value) => (value === null ? '–' : `${shown(value)} ${line.unit}`.trim()),
   };
 }
@@ -158,8 +185,8 @@ function nameAxis(names: string[]): Partial<uPlot.Axis> {
 
 /** Adds a chart to `parent`; nothing if no line has a value. */
 export function addChart(parent: HTMLElement, spec: ChartSpec): void {
-  const lines = spec.lines.filter((line) => Array.from(line.values).some(Number.isFinite));
-  if (lines.length === 0) return;
+  const lines = spec.lines.filter((line) => line.edge || Array.from(line.values).some(Number.isFinite));
+  if (!lines.some((line) => !line.edge)) return;
   const box = element('div', { class: 'plot' });
   const heading = element('h3', {}, spec.title);
   parent.append(element('figure', { class: 'chart' }, heading, box));
@@ -181,14 +208,14 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
   const plot = new uPlot(
     {
       width: Math.max(200, Math.floor(box.clientWidth)),
-      height: HEIGHT,
+      height: spec.height ?? HEIGHT,
       scales,
       axes,
       series: [
         { label: spec.xLabel, value: (_plot, value) => (value === null ? '–' : shown(value)) },
-        ...lines.map((line) => series(line, spec.points ?? false)),
+        ...lines.map((line) => series(line, spec)),
       ],
-      bands: spec.bands?.map((band) => ({
+      bands: (spec.names ? [] : spec.bands)?.map((band) => ({
         series: [band.high + 1, band.low + 1] as [number, number],
         fill: () => themeColour(band.colour) + '2e',
       })),
@@ -197,7 +224,7 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
         drag: { x: true, y: false },
         points: { size: 6 },
       },
-      plugins: spec.sync === 'time' ? [markPlugin()] : [],
+      plugins: spec.bands ? [whiskerPlugin(spec.bands)] : spec.sync === 'time' ? [markPlugin()] : [],
     },
     [gaps(spec.x), ...lines.map((line) => gaps(line.values))] as uPlot.AlignedData,
     box,

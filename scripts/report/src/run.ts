@@ -148,22 +148,21 @@ function speedChoice(replay: Replay): HTMLElement {
 }
 
 function addScene(box: HTMLElement, replay: Replay, data: ConstructorParameters<typeof FlightScene>[1]): void {
+  if (!FlightScene.possible()) {
+    const text = 'No WebGL here, so no 3D view; the path over the map below follows the slider.';
+    box.append(element('p', { class: 'notice', id: 'no-webgl' }, text));
+    return;
+  }
   const view = element('div', { id: 'view' });
   box.append(view);
-  try {
-    const scene = new FlightScene(view, data);
-    replay.onChange((time) => scene.setTime(time));
-    box.append(layerBoxes(scene), cutSlider(scene));
-    if (data.cloud.x.length > 0 && data.run.cloud.growth.t.length === 0) {
-      const text = 'This run did not record when its map grew: it is shown whole at any time.';
-      box.append(element('p', { class: 'note' }, text));
-    }
-  } catch (error) {
-    view.remove();
-    const text = 'No WebGL here, so no 3D view; the path over the map follows the slider.';
-    box.prepend(element('p', { class: 'notice', id: 'no-webgl' }, text));
-    console.warn(String(error));
-  }
+  const scene = new FlightScene(view, data);
+  replay.onChange((time) => scene.setTime(time));
+  box.append(layerBoxes(scene), cutSlider(scene));
+  const { growth, total } = data.run.cloud;
+  if (total === 0) return;
+  const count = `${data.cloud.x.length.toLocaleString('en')} of the map's ${total.toLocaleString('en')} points.`;
+  const when = growth.t.length > 0 ? '' : ' This run did not record when its map grew: it is shown whole at any time.';
+  box.append(element('p', { class: 'note' }, `Coloured by height; ${count} Drag to orbit, right drag to move.${when}`));
 }
 
 function coverageCharts(box: HTMLElement, coverage: Columns, pick: (t: number) => void): void {
@@ -229,10 +228,6 @@ export async function showRun(run: RunPayload): Promise<void> {
   section.append(
     element('div', { class: 'transport' }, replay.play, replay.slider, speedChoice(replay), readout(replay, flight)),
   );
-  if (run.cloud.total > 0) {
-    const count = `${cloud.x.length.toLocaleString('en')} of the map's ${run.cloud.total.toLocaleString('en')} points.`;
-    section.append(element('p', { class: 'note' }, `Coloured by height; ${count} Drag to orbit, right drag to move.`));
-  }
   followOnMap(replay, truth ?? estimate);
 
   const charts = byId('charts');

@@ -134,16 +134,22 @@ export class FlightScene {
   private vehicle = vehicleMesh();
   private time = 0;
   private asked = false;
+  private printed = document.createElement('canvas');
 
-  /** @throws if there is no WebGL. */
+  static possible(): boolean {
+    return document.createElement('canvas').getContext('webgl2') !== null;
+  }
+
+  /** @pre possible() */
   constructor(box: HTMLElement, private data: SceneData) {
-    // Kept so that a page can be printed and a picture taken at any time.
+    // Kept so that a picture can be taken at any time.
     this.renderer = new WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
     this.renderer.localClippingEnabled = true;
     this.canvas = this.renderer.domElement;
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'Three-dimensional view of the map and the flight');
-    box.append(this.canvas);
+    this.printed.className = 'printed';
+    box.append(this.canvas, this.printed);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener('change', () => this.ask());
@@ -176,6 +182,7 @@ export class FlightScene {
     onThemeChange(() => {
       this.paint();
       this.draw();
+      this.copyForPrint();
     });
   }
 
@@ -360,6 +367,15 @@ export class FlightScene {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.draw();
+  }
+
+  /** Browsers print the frame that was last on the screen, in its colours: paper gets a copy. */
+  private copyForPrint(): void {
+    if (!matchMedia('print').matches) return;
+    this.printed.width = this.canvas.width;
+    this.printed.height = this.canvas.height;
+
+    this.printed.getContext('2d')?.drawImage(this.canvas, 0, 0);
   }
 
   private ask(): void {

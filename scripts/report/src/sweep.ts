@@ -30,8 +30,8 @@ class FigureView {
   private figure: string;
   private across: string;
   private by: string;
-  private charts = element('div', { class: 'charts' });
-  private heat = element('div', { class: 'scroll' });
+  private charts = element('div');
+  private heat = element('div', { class: 'heat-box' });
 
   constructor(private results: Results, section: HTMLElement) {
     const usual = ['coverage.t95_s', 'coverage.area_fraction', 'sim_time_s', SUCCESS];
@@ -50,7 +50,8 @@ class FigureView {
       controls.append(choice('across', 'across', factors, this.across, set((v) => (this.across = v))));
       controls.append(choice('by', 'by', ['', ...factors], this.by, set((v) => (this.by = v))));
     }
-    section.append(element('h2', {}, 'Effect of what was varied'), controls, this.charts, this.heat);
+    section.append(element('h2', {}, 'Effect of what was varied'), controls,
+      element('div', { class: 'columns' }, this.charts, this.heat));
     section.append(element('p', { class: 'note' },
       'Means over seeds and over every key not chosen, with 95 % confidence intervals (Student; Wilson for ' +
       'shares). Runs without the figure are left out; n says how many had it.'));
@@ -88,9 +89,13 @@ class FigureView {
       const name = group === undefined ? 'mean' : `${shortKey(by)} ${group ?? '–'}`;
       const first = lines.length;
       lines.push({ label: name, values: estimates.map((e) => e.mean), colour, unit: '' });
-      lines.push({ label: 'low', values: estimates.map((e) => e.low), colour, unit: '', faint: true });
-      lines.push({ label: 'high', values: estimates.map((e) => e.high), colour, unit: '', faint: true });
+      lines.push({ label: 'low', values: estimates.map((e) => e.low), colour, unit: '', edge: true });
+      lines.push({ label: 'high', values: estimates.map((e) => e.high), colour, unit: '', edge: true });
       bands.push({ low: first + 1, high: first + 2, colour });
+    }
+    if (groups.length > LINE_COLOURS) {
+      const text = `The first ${LINE_COLOURS} of ${groups.length} values of ${by} are drawn; the heat map has all.`;
+      this.charts.append(element('p', { class: 'note' }, text));
     }
     addChart(this.charts, {
       title: `${figure} over ${across}`,
@@ -100,6 +105,7 @@ class FigureView {
       bands,
       points: true,
       zero: false,
+      height: 300,
       names: numeric ? undefined : levels.map(String),
     });
   }
@@ -128,7 +134,7 @@ class FigureView {
       body.append(line);
     });
     table.append(body);
-    this.heat.append(table);
+    this.heat.append(element('h3', {}, `${figure}, mean`), table);
   }
 }
 
@@ -243,7 +249,8 @@ class RunTable {
         this.draw();
       },
     }, shortKey(name));
-    const cell = element('th', { title: name }, button);
+    const words = this.results.payload.rows.some((_row, i) => typeof this.results.cell(i, name) === 'string');
+    const cell = element('th', { title: name, class: words ? 'word' : '' }, button);
     if (this.sortedBy === name) cell.setAttribute('aria-sort', this.direction > 0 ? 'ascending' : 'descending');
     return cell;
   }

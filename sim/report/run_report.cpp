@@ -100,8 +100,11 @@ std::string header_html(const RunRecord& run) {
   html += "<p>" + escape_html(summary.text("/reason"));
   const std::string source = summary.text("/odometry/source");
   if (!source.empty()) html += ". Odometry: " + escape_html(source);
-  html += ". Trajectory <code>" + escape_html(summary.text("/trajectory_hash")) +
-          "</code>, build " + escape_html(summary.text("/build/version")) + "</p>\n";
+  const std::string hash = summary.text("/trajectory_hash");
+  if (!hash.empty()) html += ". Trajectory <code>" + escape_html(hash) + "</code>";
+  const std::string version = summary.text("/build/version");
+  if (!version.empty()) html += ", build " + escape_html(version);
+  html += "</p>\n";
   return html + key_figures_html(key_figures(summary));
 }
 

@@ -140,8 +140,8 @@ class FigureView {
 
 function heatCell(estimate: Estimate, low: number, high: number): HTMLElement {
   if (estimate.n === 0) return element('td', {}, '–');
-  const half = (estimate.high - estimate.low) / 2;
-  const small = Number.isFinite(half) ? `± ${shown(half, 2)}, n ${estimate.n}` : `n ${estimate.n}`;
+  const known = Number.isFinite(estimate.low) ? `${shown(estimate.low, 3)} … ${shown(estimate.high, 3)}, ` : '';
+  const small = `${known}n ${estimate.n}`;
   const cell = element('td', {}, shown(estimate.mean, 3), element('small', {}, small));
   const share = high > low ? (estimate.mean - low) / (high - low) : 0.5;
   cell.style.background = blend('--heat-low', '--heat-high', share);

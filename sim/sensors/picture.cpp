@@ -251,9 +251,11 @@ PictureRenderer::~PictureRenderer() {
 Picture PictureRenderer::render(const Pose& X_WC, const PictureOptions& options,
                                 const PictureOverlay& overlay) {
   const PinholeCamera camera = supersampled_camera(options);
-  const auto visible = visible_chunks(impl_->chunks, ViewVolume(camera, X_WC, kFar));
   const float cut_above =
       options.cut_above_m < kNoCut ? static_cast<float>(options.cut_above_m) : kNoCut;
+  auto visible = visible_chunks(impl_->chunks, ViewVolume(camera, X_WC, kFar));
+  std::erase_if(visible,
+                [&](std::uint32_t i) { return impl_->chunks[i].bounds.min().z() > cut_above; });
   const bool headlight = options.light == PictureOptions::Light::kSunAndHeadlight ||
                          (options.light == PictureOptions::Light::kAutomatic && impl_->interior &&
                           cut_above == kNoCut);

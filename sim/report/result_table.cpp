@@ -80,6 +80,10 @@ std::vector<ResultRow> sweep_rows(const std::filesystem::path& folder) {
   for (const auto& cells : table.rows) {
     ResultRow row;
     row.folder = folder / cells[*run];
+    // What is left of a run that broke stands beside.
+    const std::filesystem::path failed = row.folder.string() + ".failed";
+    if (!std::filesystem::exists(row.folder) && std::filesystem::exists(failed))
+      row.folder = failed;
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (i == *run) continue;
       (i < *seed ? row.keys : row.rest).emplace_back(table.columns[i], cells[i]);

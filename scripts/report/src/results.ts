@@ -28,13 +28,21 @@ function compare(a: Cell, b: Cell): number {
   return String(a).localeCompare(String(b), 'en', { numeric: true });
 }
 
+/** A key with more values than this is drawn in ranges: a sample, not a grid. */
+const MAX_LEVELS = 12;
+const RANGES = 8;
+
 export class Results {
+  /** Keys whose values stand for ranges, by the ranges' middles. */
+  readonly ranged: string[] = [];
+  private levelOf = new Map<string, Cell[]>();
   /** Keys with more than one value. */
   readonly factors: string[];
   /** Columns that hold numbers which are not all the same, and success. */
   readonly figures: string[];
 
   constructor(readonly payload: SweepPayload) {
+    for (const key of payload.keys) this.levelOf.set(key, this.groupedValues(key));
     this.factors = payload.keys.filter((key) => this.levels(key).length > 1);
     const others = payload.columns.slice(payload.keys.length);
     const numeric = others.filter((name) => {
@@ -55,10 +63,23 @@ export class Results {
     return typeof cell === 'number' ? cell : null;
   }
 
+  /** Each row's value of a key, or the middle of its range. */
+  private groupedValues(key: string): Cell[] {
+    const cells = this.payload.rows.map((_row, i) => this.cell(i, key));
+    const numbers = cells.filter((cell) => typeof cell === 'number');
+    if (numbers.length < cells.length || new Set(numbers).size <= MAX_LEVELS) return cells;
+    this.ranged.push(key);
+    const low = numbers.reduce((a, b) => Math.min(a, b));
+    const width = (numbers.reduce((a, b) => Math.max(a, b)) - low) / RANGES;
+    return numbers.map((value) => {
+      const range = Math.min(RANGES - 1, Math.floor((value - low) / width));
+      return Number((low + (range + 0.5) * width).toPrecision(4));
+    });
+  }
+
   /** The values of a key, in order. */
   levels(key: string): Cell[] {
-    const seen = new Map<string, Cell>();
-    this.payload.rows.forEach((_row, i) => seen.set(String(this.cell(i, key)), this.cell(i, key)));
+    const seen = new Map((this.levelOf.get(key) ?? []).map((cell) => [String(cell), cell]));
     return [...seen.values()].sort(compare);
   }
 
@@ -66,7 +87,7 @@ export class Results {
   where(values: Record<string, Cell>): number[] {
     return this.payload.rows
       .map((_row, i) => i)
-      .filter((i) => Object.entries(values).every(([key, value]) => this.cell(i, key) === value));
+      .filter((i) => Object.entries(values).every(([key, value]) => this.levelOf.get(key)?.[i] === value));
   }
 
   estimate(rows: number[], figure: string): Estimate {
@@ -78,7 +99,7 @@ export class Results {
   configurations(): { name: string; values: Record<string, Cell> }[] {
     const found = new Map<string, Record<string, Cell>>();
     this.payload.rows.forEach((_row, i) => {
-      const values = Object.fromEntries(this.factors.map((key) => [key, this.cell(i, key)]));
+      const values = Object.fromEntries(this.factors.map((key) => [key, this.levelOf.get(key)![i]]));
       const name = this.factors.map((key) => `${shortKey(key)} ${values[key] ?? '–'}`).join(', ');
       if (!found.has(name)) found.set(name, values);
     });

@@ -55,6 +55,10 @@ class FigureView {
     section.append(element('p', { class: 'note' },
       'Means over seeds and over every key not chosen, with 95 % confidence intervals (Student; Wilson for ' +
       'shares). Runs without the figure are left out; n says how many had it.'));
+    if (results.ranged.length > 0) {
+      const text = `Of ${results.ranged.join(', ')} each value stands for the range around it.`;
+      section.append(element('p', { class: 'note' }, text));
+    }
     onThemeChange(() => this.drawHeat());
     this.draw();
   }

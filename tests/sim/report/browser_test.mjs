@@ -158,6 +158,20 @@ async function testSweep(browser, width, dark) {
   await page.close();
 }
 
+/** Forty values of a key are drawn as eight ranges. */
+async function testHypercube(browser) {
+  const page = await browser.open(address('cube'));
+  const heads = await page.run(`[...document.querySelectorAll('.heat thead th')].slice(1).map((th) => th.textContent)`);
+  assert.deepEqual(heads, ['0.15', '0.25', '0.35', '0.45', '0.55', '0.65', '0.75', '0.85']);
+  assert.match(await page.run(`document.getElementById('figures').textContent`), /stands for the range/);
+  const cells = await page.run(`[...document.querySelectorAll('.heat td')].map((td) => td.innerText)`);
+  assert.equal(cells.length, 64);
+  const runs = cells.map((text) => Number(/n (\d+)$/.exec(text)?.[1] ?? 0));
+  assert.equal(runs.reduce((a, b) => a + b), 40);
+  await assertSound(page, 1280);
+  await page.close();
+}
+
 const browser = new Browser(chromium);
 try {
   execFileSync(fixture, [folder]);
@@ -165,12 +179,13 @@ try {
     await testRun(browser, width, dark);
     await testSweep(browser, width, dark);
   }
+  await testHypercube(browser);
   await testPlay(browser);
   await testWithoutGrowth(browser);
   await testWithoutWebGl(browser);
   await testWithoutScript(browser);
   await testPaper(browser);
-  console.log('9 passed, 0 failed');
+  console.log('10 passed, 0 failed');
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

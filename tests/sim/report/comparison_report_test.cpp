@@ -52,6 +52,8 @@ TEST(ComparisonReport, LinksToTheRunsThatAreThere) {
   auto links = comparison_payload(results, folder.path())["links"];
   EXPECT_EQ(links[0], "./runs/0000000000000000/");
   EXPECT_EQ(links[1], "");
+  std::filesystem::create_directory(folder / "runs/0000000000000009.failed");
+  EXPECT_EQ(read_results({folder.path()}).folders[9], folder / "runs/0000000000000009.failed");
   write_text(folder / "runs/0000000000000000/report.html", "");
   links = comparison_payload(results, folder.path())["links"];
   EXPECT_EQ(links[0], "./runs/0000000000000000/report.html");

@@ -1,5 +1,5 @@
 // Writes what the browser test opens: FOLDER/run, FOLDER/old (without the growth of its cloud) and
-// FOLDER/sweep, each with its report.
+// FOLDER/sweep and FOLDER/cube, each with its report.
 
 #include <cstdio>
 #include <filesystem>
@@ -22,8 +22,12 @@ int main(int argc, char** argv) {
     const RunRecord run = read_run(folder / name, kMaxReportPoints);
     write_page(folder / name / "report.html", run_report_html(run));
   }
-  const std::filesystem::path sweep = folder / "sweep";
-  test::write_synthetic_sweep(sweep);
-  write_page(sweep / "report.html", comparison_report_html(read_results({sweep}), "Sweep", sweep));
+  test::write_synthetic_sweep(folder / "sweep");
+  test::write_synthetic_hypercube(folder / "cube");
+  for (const char* name : {"sweep", "cube"}) {
+    const std::filesystem::path sweep = folder / name;
+    write_page(sweep / "report.html",
+               comparison_report_html(read_results({sweep}), "Sweep", sweep));
+  }
   return 0;
 }

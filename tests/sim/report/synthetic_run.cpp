@@ -169,4 +169,20 @@ void write_synthetic_sweep(const std::filesystem::path& folder) {
   arex::test::write_text(folder / "sweep.csv", csv);
 }
 
+void write_synthetic_hypercube(const std::filesystem::path& folder) {
+  constexpr int kPoints = 40;
+  std::string csv =
+      "run,scenario,imu.gyro_noise,lidar.range_noise_m,seed,failure,detail,outcome,sim_time_s\n";
+  std::array<char, 160> line{};
+  for (int i = 0; i < kPoints; ++i) {
+    const double x = 0.1 + 0.8 * i / (kPoints - 1);
+    const double y = 0.1 + 0.8 * (7 * i % kPoints) / (kPoints - 1);
+    std::snprintf(line.data(), line.size(), "runs/%d,room,%.4f,%.4f,1,,,succeeded,%.3f\n", i, x, y,
+                  10 * x);
+    csv += line.data();
+  }
+  std::filesystem::create_directories(folder);
+  arex::test::write_text(folder / "sweep.csv", csv);
+}
+
 }  // namespace arex::sim::test

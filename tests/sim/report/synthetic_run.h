@@ -21,4 +21,7 @@ void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun
 /// collided. The first run is there in full, the others have their row only.
 void write_synthetic_sweep(const std::filesystem::path& folder);
 
+/// Writes the sweep.csv of a Latin hypercube: two keys, 40 points, no two values the same.
+void write_synthetic_hypercube(const std::filesystem::path& folder);
+
 }  // namespace arex::sim::test

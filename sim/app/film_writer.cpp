@@ -37,6 +37,7 @@ class FfmpegFilm : public FilmWriter {
     add_words({"-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"});
     add_words({"-movflags", "+faststart", "-f", "mp4", part_.string()});
     std::vector<char*> arguments;
+    arguments.reserve(words.size() + 1);
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
 

@@ -104,7 +104,7 @@ sim::Picture FlightPictures::at(double time_s, double path_until_s) {
 }
 
 sim::Picture FlightPictures::chase(double time_s, double path_until_s) {
-  const Pose X_WB = X_WB_at(time_s);
+  const Pose X_WB = vehicle_at(time_s);
   const double yaw = so3::yaw(X_WB.R);
   if (heading_time_s_ < 0 || time_s < heading_time_s_) {
     heading_rad_ = yaw;
@@ -121,7 +121,7 @@ sim::Picture FlightPictures::chase(double time_s, double path_until_s) {
 
 sim::Picture FlightPictures::top(double time_s, double path_until_s,
                                  const sim::PictureOptions& options) {
-  const Vec3 p_WB = X_WB_at(time_s).p;
+  const Vec3 p_WB = vehicle_at(time_s).p;
   const TopCamera camera(box_of(path_), options);
   sim::PictureOptions cut = options;
   if (!(std::abs(p_WB.z() + kCutAbove - cut_above_m_) <= kCutSlack)) {
@@ -140,7 +140,7 @@ sim::Picture FlightPictures::top(double time_s, double path_until_s,
   return top_->render(camera.X_WC, cut, drawn);
 }
 
-Pose FlightPictures::X_WB_at(double time_s) const {
+Pose FlightPictures::vehicle_at(double time_s) const {
   const auto after = std::upper_bound(
       path_.begin(), path_.end(), time_s,
       [](double time, const sim::StampedPose& pose) { return time < pose.time_s; });
@@ -154,7 +154,7 @@ Pose FlightPictures::X_WB_at(double time_s) const {
 sim::PictureOverlay FlightPictures::overlay(double time_s, double path_until_s,
                                             double radius_m) const {
   sim::PictureOverlay overlay;
-  overlay.vehicles.push_back(X_WB_at(time_s));
+  overlay.vehicles.push_back(vehicle_at(time_s));
   sim::PictureOverlay::Path path;
   path.radius_m = radius_m;
   for (const sim::StampedPose& pose : path_) {

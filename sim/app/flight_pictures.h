@@ -30,7 +30,7 @@ class FlightPictures {
   [[nodiscard]] sim::Picture chase(double time_s, double path_until_s);
   [[nodiscard]] sim::Picture top(double time_s, double path_until_s,
                                  const sim::PictureOptions& options);
-  [[nodiscard]] Pose X_WB_at(double time_s) const;
+  [[nodiscard]] Pose vehicle_at(double time_s) const;
   [[nodiscard]] sim::PictureOverlay overlay(double time_s, double path_until_s,
                                             double radius_m) const;
 

@@ -24,11 +24,17 @@ struct ResultRow {
   std::filesystem::path folder;
 };
 
+std::string dotted(const std::string& key, const std::string& name) {
+  std::string text = key;
+  if (!text.empty()) text += '.';
+  return text += name;
+}
+
 // A list counts by its length, as in sweep.csv.
 void flatten_json(const ordered_json& value, const std::string& key, Cells& cells) {
   if (value.is_object()) {
     for (const auto& [name, child] : value.items()) {
-      flatten_json(child, key.empty() ? name : key + "." + name, cells);
+      flatten_json(child, dotted(key, name), cells);
     }
   } else if (value.is_array()) {
     cells.emplace_back(key + ".count", std::to_string(value.size()));
@@ -41,7 +47,7 @@ void flatten_yaml(const ConfigNode& node, const std::string& key, Cells& cells) 
   switch (node.kind) {
     case ConfigNode::Kind::kMap:
       for (const ConfigNode::Entry& entry : node.entries) {
-        flatten_yaml(entry.value, key.empty() ? entry.key : key + "." + entry.key, cells);
+        flatten_yaml(entry.value, dotted(key, entry.key), cells);
       }
       return;
     case ConfigNode::Kind::kSequence: {

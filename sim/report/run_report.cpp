@@ -160,9 +160,10 @@ std::string events_html(const Table& events) {
       "<th class=\"word\">kind</th><th class=\"text\">detail</th></tr></thead>\n<tbody>\n";
   for (std::size_t i = 0; i < std::min(events.rows.size(), kMaxEvents); ++i) {
     const std::string time = escape_html(events.text(i, "time_s"));
-    html += "<tr data-t=\"" + time + "\"><td>" + time + "</td><td class=\"word\">" +
-            escape_html(events.text(i, "kind")) + "</td><td class=\"text\">" +
-            escape_html(events.text(i, "detail")) + "</td></tr>\n";
+    html.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
+    html.append("</td><td class=\"word\">").append(escape_html(events.text(i, "kind")));
+    html.append("</td><td class=\"text\">").append(escape_html(events.text(i, "detail")));
+    html += "</td></tr>\n";
   }
   html += "</tbody>\n</table></div>\n";
   if (events.rows.size() > kMaxEvents) {

@@ -15,7 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMaxEvents = 2000;  // rows of the page's table
+constexpr std::size_t kMaxEvents = 2000;     // rows of the page's table
+constexpr std::size_t kMaxDecisions = 1000;  // likewise
 
 /// Reads a summary whose sections may be null.
 class Summary {
@@ -147,6 +148,44 @@ std::string timing_html(const Table& timing) {
   return html + "</tbody>\n</table></div>\n</section>\n";
 }
 
+// A row a decision that chose a target or stopped: how many candidates, and the winner's terms.
+std::string decisions_html(const Table& decisions) {
+  std::string rows;
+  std::size_t count = 0;
+  for (std::size_t begin = 0, end = 0; begin < decisions.rows.size(); begin = end) {
+    const std::string number = decisions.text(begin, "decision");
+    std::size_t kept = 0;
+    std::optional<std::size_t> winner;
+    for (end = begin; end < decisions.rows.size() && decisions.text(end, "decision") == number;
+         ++end) {
+      if (decisions.text(end, "verdict") == "kept") ++kept;
+      if (decisions.text(end, "winner") == "1") winner = end;
+    }
+    const std::string kind = decisions.text(begin, "kind");
+    if (kind == "keep_target" || ++count > kMaxDecisions) continue;
+    const std::string time = escape_html(decisions.text(begin, "time_s"));
+    const std::string stop = decisions.text(begin, "stop_reason");
+    const bool some = !decisions.text(begin, "candidate").empty();
+    rows.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
+    rows.append("</td><td class=\"word\">").append(escape_html(kind));
+    if (kind == "stop") rows.append(": ").append(escape_html(stop));
+    rows.append("</td><td>").append(some ? std::to_string(end - begin) : "0");
+    rows.append("</td><td>").append(std::to_string(kept)).append("</td>");
+    for (const char* name : {"information_m2", "distance_m", "angle_rad", "revenue"}) {
+      rows += "<td>";
+      if (winner) rows += escape_html(decisions.text(*winner, name));
+      rows += "</td>";
+    }
+    rows += "</tr>\n";
+  }
+  if (rows.empty()) return {};
+  return "<section id=\"decisions\">\n<h2>Decisions</h2>\n<div class=\"scroll\"><table "
+         "class=\"data\">\n<thead><tr><th>time, s</th><th class=\"word\">kind</th>"
+         "<th>candidates</th><th>kept</th><th>information, m²</th><th>distance, m</th>"
+         "<th>angle, rad</th><th>revenue</th></tr></thead>\n<tbody>\n" +
+         rows + "</tbody>\n</table></div>\n</section>\n";
+}
+
 std::string events_html(const Table& events) {
   if (events.rows.empty()) return {};
   std::map<std::string, std::size_t> kinds;
@@ -203,6 +242,7 @@ std::string run_report_html(const RunRecord& run) {
   html += "<section>\n<h2>Against time</h2>\n<div id=\"charts\"></div>\n</section>\n";
   html +=
       "<div class=\"columns\">\n" + timing_html(run.timing) + events_html(run.events) + "</div>\n";
+  html += decisions_html(run.decisions);
   html += details_html(run);
   std::string name = run.folder.filename().string();
   return report_page(

@@ -3,7 +3,7 @@
 import { addChart, setMark } from './charts';
 import { byId, element } from './dom';
 import { Columns, RunPayload, Track, decode, decodeAll, indexAt } from './payload';
-import { FlightScene, Layer } from './scene';
+import { FlightScene, Layer, SceneData } from './scene';
 
 const DEGREES = 180 / Math.PI;
 
@@ -147,17 +147,17 @@ function speedChoice(replay: Replay): HTMLElement {
   return choice;
 }
 
-function addScene(box: HTMLElement, replay: Replay, data: ConstructorParameters<typeof FlightScene>[1]): void {
+function addScene(box: HTMLElement, transport: HTMLElement, replay: Replay, data: SceneData): void {
   if (!FlightScene.possible()) {
     const text = 'No WebGL here, so no 3D view; the path over the map below follows the slider.';
-    box.append(element('p', { class: 'notice', id: 'no-webgl' }, text));
+    box.append(element('p', { class: 'notice', id: 'no-webgl' }, text), transport);
     return;
   }
   const view = element('div', { id: 'view' });
   box.append(view);
   const scene = new FlightScene(view, data);
   replay.onChange((time) => scene.setTime(time));
-  box.append(layerBoxes(scene), cutSlider(scene));
+  box.append(transport, layerBoxes(scene), cutSlider(scene));
   const { growth, total } = data.run.cloud;
   if (total === 0) return;
   const count = `${data.cloud.x.length.toLocaleString('en')} of the map's ${total.toLocaleString('en')} points.`;
@@ -204,9 +204,9 @@ function flightCharts(box: HTMLElement, flight: Columns, pick: (t: number) => vo
   });
 }
 
-/** A click on an event goes to its moment. */
-function linkEvents(replay: Replay): void {
-  for (const row of document.querySelectorAll<HTMLElement>('#events tr[data-t]')) {
+/** A click on an event or a decision goes to its moment. */
+function linkMoments(replay: Replay): void {
+  for (const row of document.querySelectorAll<HTMLElement>('tr[data-t]')) {
     row.addEventListener('click', () => replay.set(Number(row.dataset.t)));
   }
 }
@@ -224,10 +224,9 @@ export async function showRun(run: RunPayload): Promise<void> {
   const replay = new Replay(run.duration_s);
   const section = byId('replay');
   section.replaceChildren(element('h2', {}, 'Replay'));
-  addScene(section, replay, { run, cloud, truth, estimate, candidates: { x, y } });
-  section.append(
-    element('div', { class: 'transport' }, replay.play, replay.slider, speedChoice(replay), readout(replay, flight)),
-  );
+  const transport = element('div', { class: 'transport' }, replay.play, replay.slider, speedChoice(replay));
+  transport.append(readout(replay, flight));
+  addScene(section, transport, replay, { run, cloud, truth, estimate, candidates: { x, y } });
   followOnMap(replay, truth ?? estimate);
 
   const charts = byId('charts');
@@ -236,6 +235,6 @@ export async function showRun(run: RunPayload): Promise<void> {
   coverageCharts(charts, coverage, pick);
   flightCharts(charts, flight, pick);
   replay.onChange(setMark);
-  linkEvents(replay);
+  linkMoments(replay);
   replay.set(run.duration_s);
 }

@@ -41,6 +41,28 @@ TEST(RunReport, TellsOutcomeFiguresEventsAndTiming) {
   EXPECT_FALSE(contains(html, "Not in the run folder"));
 }
 
+TEST(RunReport, ListsWhatEachDecisionHadToChooseFrom) {
+  const TemporaryFolder folder;
+  RunRecord run = recorded(folder);
+  run.decisions = parse_table(
+      "time_s,decision,kind,source,previous_end,stop_reason,candidate,winner,x_m,y_m,verdict,"
+      "information_m2,distance_m,angle_rad,direction,revenue\n"
+      "1.0,0,new_target,trees,none,none,0,0,1,2,no_viewpoint,1.5,9,,1,0\n"
+      "1.0,0,new_target,trees,none,none,1,1,3,4,kept,2.5,8,0.3,1,-7.5\n"
+      "2.0,1,keep_target,trees,none,none,,,,,,,,,,\n"
+      "3.0,2,stop,trees,none,little_left,,,,,,,,,,\n");
+  const std::string html = run_report_html(run);
+  const std::size_t at = html.find("<h2>Decisions</h2>");
+  ASSERT_NE(at, std::string::npos);
+  const std::string rows = html.substr(at, html.find("</section>", at) - at);
+  EXPECT_TRUE(contains(rows,
+                       "<td>1.0</td><td class=\"word\">new_target</td><td>2</td><td>1</td>"
+                       "<td>2.5</td><td>8</td><td>0.3</td><td>-7.5</td>"))
+      << rows;
+  EXPECT_TRUE(contains(rows, "stop: little_left</td><td>0</td><td>0</td><td></td>")) << rows;
+  EXPECT_FALSE(contains(rows, "keep_target"));
+}
+
 TEST(RunReport, NeedsNothingFromOutside) {
   const TemporaryFolder folder;
   const std::string html = run_report_html(recorded(folder));

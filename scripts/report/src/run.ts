@@ -236,5 +236,7 @@ export async function showRun(run: RunPayload): Promise<void> {
   flightCharts(charts, flight, pick);
   replay.onChange(setMark);
   linkMoments(replay);
-  replay.set(run.duration_s);
+  // report.html#t=70 opens at that moment.
+  const asked = Number(new URLSearchParams(location.hash.slice(1)).get('t') ?? NaN);
+  replay.set(Number.isFinite(asked) ? asked : run.duration_s);
 }

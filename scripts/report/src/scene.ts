@@ -41,8 +41,13 @@ function percentile(values: Float64Array, share: number): number {
   return sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
-/** Points are discs, not squares. */
-const ROUND_POINT = 'void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard;';
+/** Discs instead of squares. */
+function makeRound(material: PointsMaterial): void {
+  material.onBeforeCompile = (shader) => {
+    const round = 'void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard;';
+    shader.fragmentShader = shader.fragmentShader.replace('void main() {', round);
+  };
+}
 
 /** A path that grows: `upTo` shows its beginning. */
 class GrowingLine {
@@ -198,7 +203,7 @@ export class FlightScene {
     const centre = new Vector3(...axes.map(([low, high]) => (low + high) / 2));
     const diagonal = Math.hypot(...axes.map(([low, high]) => high - low));
     // A narrow view needs more room.
-    const reach = (0.56 * Math.max(10, diagonal)) / Math.min(1, this.camera.aspect);
+    const reach = (0.5 * Math.max(10, diagonal)) / Math.min(1, this.camera.aspect);
     this.controls.target.copy(centre);
     this.camera.position.copy(centre).add(new Vector3(-0.45, -0.95, 1.0).multiplyScalar(reach));
     this.controls.update();
@@ -277,9 +282,7 @@ export class FlightScene {
     geometry.setAttribute('position', new BufferAttribute(positions, 3));
     geometry.setAttribute('color', new BufferAttribute(colours, 3, true));
     const material = new PointsMaterial({ size: 0.12, vertexColors: true, clippingPlanes: [this.cut] });
-    material.onBeforeCompile = (shader) => {
-      shader.fragmentShader = shader.fragmentShader.replace('void main() {', ROUND_POINT);
-    };
+    makeRound(material);
     this.points = new Points(geometry, material);
     this.points.frustumCulled = false;
     this.scene.add(this.points);
@@ -316,6 +319,7 @@ export class FlightScene {
     const colours = new Uint8Array(3 * x.length);
     geometry.setAttribute('color', new BufferAttribute(colours, 3, true));
     const material = new PointsMaterial({ size: 6, sizeAttenuation: false, vertexColors: true });
+    makeRound(material);
     this.candidates = new Points(geometry, material);
     this.candidates.frustumCulled = false;
     this.scene.add(this.candidates);

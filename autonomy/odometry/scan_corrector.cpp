@@ -167,8 +167,8 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   if (refused_in_a_row_ >= hc.lost_scans || doubtful_in_a_row_ >= hc.lost_scans ||
       position_std > hc.lost_position_std_m || rotation_std > hc.lost_rotation_std_rad) {
     status_ = OdometryStatus::kLost;
-  } else if (!report.accepted || weak || doubtful || update.gyro_clipped ||
-             confirmations_left_ > 0) {
+  } else if (!report.accepted || weak || report.surprise > hc.noticed_surprise ||
+             update.gyro_clipped || confirmations_left_ > 0) {
     status_ = OdometryStatus::kDegenerate;
   } else {
     status_ = OdometryStatus::kOk;

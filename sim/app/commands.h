@@ -18,8 +18,9 @@ struct ScenarioArguments {
 
 struct RunArguments {
   ScenarioArguments scenario;
-  std::string out;  ///< empty: runs/<scenario>-seed<seed>
-  std::string bag;  ///< ROS 1 bag to write; empty: none
+  std::string out;   ///< empty: runs/<scenario>-seed<seed>
+  std::string name;  ///< of the scenario, in the summary; empty: the file's
+  std::string bag;   ///< ROS 1 bag to write; empty: none
   int threads = 1;
   bool quiet = false;
 };
@@ -46,6 +47,15 @@ struct RenderArguments {
   std::optional<double> time_s;  ///< moment of the flight; default its middle
 };
 int render(const RenderArguments& arguments);
+
+struct SweepArguments {
+  std::string file;
+  std::string out;
+  int jobs = 0;          ///< runs at a time; 0: one a core
+  bool dry_run = false;  ///< list what would run
+  bool status = false;   ///< say what has run
+};
+int sweep(const SweepArguments& arguments);
 
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);

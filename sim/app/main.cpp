@@ -22,6 +22,7 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("run", "fly a scenario, write a scored run folder");
   add_scenario_options(*command, arguments.scenario, true);
   command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
+  command->add_option("--name", arguments.name, "the scenario's name; default the file's");
   command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
   command->add_option("--threads", arguments.threads, "host threads; the result does not change")
       ->check(CLI::Range(1, 64));
@@ -59,6 +60,17 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = render(arguments); });
 }
 
+void add_sweep(CLI::App& app, SweepArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("sweep", "fly many runs, each a process of its own");
+  command->add_option("sweep", arguments.file, "sweep file, scenarios/sweeps/*.yaml")->required();
+  command->add_option("--out", arguments.out, "folder; the same command there goes on")->required();
+  command->add_option("--jobs", arguments.jobs, "runs at a time; default one a core")
+      ->check(CLI::Range(1, 1024));
+  command->add_flag("--dry-run", arguments.dry_run, "list the runs, write nothing");
+  command->add_flag("--status", arguments.status, "say how far it is, write nothing");
+  command->callback([&] { exit_code = sweep(arguments); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -69,12 +81,14 @@ int main(int argc, char** argv) {
   WorldArguments world_arguments;
   PatternArguments pattern_arguments;
   RenderArguments render_arguments;
+  SweepArguments sweep_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   add_run(app, run_arguments, exit_code);
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
   add_render(app, render_arguments, exit_code);
+  add_sweep(app, sweep_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });

@@ -88,8 +88,9 @@ int exit_code_of(sim::Outcome outcome) {
 int run(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   const double cpu_begin = cpu_seconds();
-  const sim::Scenario scenario = sim::load_scenario(
-      arguments.scenario.file, arguments.scenario.overrides, arguments.scenario.seed);
+  sim::Scenario scenario = sim::load_scenario(arguments.scenario.file, arguments.scenario.overrides,
+                                              arguments.scenario.seed);
+  if (!arguments.name.empty()) scenario.name = arguments.name;
   const std::filesystem::path folder = run_folder(arguments, scenario);
 
   // The world is built before anything is written: a bad recipe leaves nothing.

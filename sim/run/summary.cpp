@@ -1,5 +1,7 @@
 #include "run/summary.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -120,6 +122,12 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
       result.renderer.empty() ? ordered_json(nullptr) : ordered_json(result.renderer);
   json["build"] = {{"version", AREX_VERSION}, {"compiler", "g++ " __VERSION__}};
   return json;
+}
+
+bool depends_on_host(std::string_view key) {
+  static constexpr std::array<std::string_view, 5> kHostFields{
+      "wall_time_s", "cpu_time_s", "real_time_factor", "planner.median_ms", "planner.p99_ms"};
+  return std::find(kHostFields.begin(), kHostFields.end(), key) != kHostFields.end();
 }
 
 std::string odometry_error_csv(const std::vector<PosePair>& poses) {

@@ -76,7 +76,8 @@ std::optional<ordered_json> SweepFolder::summary(const std::string& id) const {
 }
 
 ordered_json SweepFolder::host(const std::string& id) const {
-  return parse_or_null(root_ / finished(id) / "host.json");
+  const ordered_json host = parse_or_null(root_ / finished(id) / "host.json");
+  return host.is_object() ? host : ordered_json::object();
 }
 
 RunState SweepFolder::state(const std::string& id) const {

@@ -46,7 +46,7 @@ class SweepFolder {
   void prepare(const SweepPlan& plan) const;
   /// The valid summary of a finished run: a mission that ended by itself.
   [[nodiscard]] std::optional<nlohmann::ordered_json> summary(const std::string& id) const;
-  /// host.json of a finished run; null without it.
+  /// host.json of a finished run; empty without it.
   [[nodiscard]] nlohmann::ordered_json host(const std::string& id) const;
   [[nodiscard]] RunState state(const std::string& id) const;
 

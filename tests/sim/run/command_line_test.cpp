@@ -1,61 +1,27 @@
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "support/temporary_folder.h"
+#include "support/process.h"
 
 // The contract of the command line, kept by the binary itself.
 namespace arex {
 namespace {
 
+using Result = test::ProcessResult;
 using test::read_text;
 using test::TemporaryFolder;
 using test::write_text;
 
 constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
 
-struct Result {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
-
-/// The binary as a child of ours.
-class Process {
- public:
-  Process(const std::vector<std::string>& arguments, const TemporaryFolder& folder)
-      : out_(folder / "stdout"), err_(folder / "stderr") {
-    pid_ = fork();
-    if (pid_ != 0) return;
-    dup2(creat(out_.c_str(), 0600), STDOUT_FILENO);
-    dup2(creat(err_.c_str(), 0600), STDERR_FILENO);
-    std::vector<char*> argv{const_cast<char*>(AREX_BINARY)};
-    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-    argv.push_back(nullptr);
-    execv(AREX_BINARY, argv.data());
-    _exit(127);
-  }
-  void signal(int number) const { kill(pid_, number); }
-  Result wait() const {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out_),
-            read_text(err_)};
-  }
-
- private:
-  std::filesystem::path out_, err_;
-  pid_t pid_ = -1;
-};
+test::Process start(const std::vector<std::string>& arguments, const TemporaryFolder& folder) {
+  return {AREX_BINARY, arguments, folder.path()};
+}
 
 Result run(const std::vector<std::string>& arguments) {
-  const TemporaryFolder folder;
-  return Process(arguments, folder).wait();
+  return test::run_process(AREX_BINARY, arguments);
 }
 
 void wait_for(const std::filesystem::path& file, std::size_t bytes) {
@@ -156,7 +122,8 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
 
 TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {
   const TemporaryFolder folder;
-  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  const auto process =
+      start({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
   wait_for(folder / "run/truth.tum", 100'000);
   process.signal(SIGINT);
   EXPECT_EQ(process.wait().exit_code, 130);
@@ -166,7 +133,8 @@ TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {
 
 TEST(CommandLine, AKilledRunLeavesNothingThatLooksFinished) {
   const TemporaryFolder folder;
-  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  const auto process =
+      start({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
   wait_for(folder / "run/truth.tum", 100'000);
   process.signal(SIGKILL);
   EXPECT_EQ(process.wait().exit_code, 128 + SIGKILL);

@@ -54,8 +54,17 @@ struct SweepArguments {
   int jobs = 0;          ///< runs at a time; 0: one a core
   bool dry_run = false;  ///< list what would run
   bool status = false;   ///< say what has run
+  bool slurm = false;    ///< submit instead of flying here
+  std::vector<std::string> sbatch_options;
 };
 int sweep(const SweepArguments& arguments);
+
+/// What a job of `sweep --slurm` does: one run of a batch.
+struct SweepTaskArguments {
+  std::string batch;
+  std::size_t index = 0;
+};
+int sweep_task(const SweepTaskArguments& arguments);
 
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);

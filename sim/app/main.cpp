@@ -1,6 +1,9 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "app/commands.h"
 #include "config/config.h"
@@ -68,13 +71,32 @@ void add_sweep(CLI::App& app, SweepArguments& arguments, int& exit_code) {
       ->check(CLI::Range(1, 1024));
   command->add_flag("--dry-run", arguments.dry_run, "list the runs, write nothing");
   command->add_flag("--status", arguments.status, "say how far it is, write nothing");
+  command->add_flag("--slurm", arguments.slurm,
+                    "submit to Slurm what is missing; all that follows goes to sbatch");
   command->callback([&] { exit_code = sweep(arguments); });
+}
+
+void add_sweep_task(CLI::App& app, SweepTaskArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("sweep-task", "one run of a batch of 'sweep --slurm'");
+  command->group("");  // for Slurm, not for people
+  command->add_option("batch", arguments.batch, "file of the batch")->required();
+  command->add_option("index", arguments.index, "of the run in it")->required();
+  command->callback([&] { exit_code = sweep_task(arguments); });
+}
+
+// Everything behind --slurm is sbatch's, whatever it looks like.
+std::vector<std::string> take_sbatch_options(std::vector<std::string>& arguments) {
+  const auto slurm = std::find(arguments.begin(), arguments.end(), "--slurm");
+  if (arguments.empty() || arguments[0] != "sweep" || slurm == arguments.end()) return {};
+  std::vector<std::string> options(slurm + 1, arguments.end());
+  arguments.erase(slurm + 1, arguments.end());
+  return options;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones"};
+  CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones", "arex"};
   app.require_subcommand(1);
   int exit_code = 0;
   RunArguments run_arguments;
@@ -82,6 +104,7 @@ int main(int argc, char** argv) {
   PatternArguments pattern_arguments;
   RenderArguments render_arguments;
   SweepArguments sweep_arguments;
+  SweepTaskArguments sweep_task_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   add_run(app, run_arguments, exit_code);
@@ -89,6 +112,7 @@ int main(int argc, char** argv) {
   add_pattern(app, pattern_arguments, exit_code);
   add_render(app, render_arguments, exit_code);
   add_sweep(app, sweep_arguments, exit_code);
+  add_sweep_task(app, sweep_task_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });
@@ -97,7 +121,10 @@ int main(int argc, char** argv) {
   validate_command->callback([&] { exit_code = validate(validate_arguments); });
 
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> words(argv + 1, argv + argc);
+    sweep_arguments.sbatch_options = take_sbatch_options(words);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    app.parse(words);
     return exit_code;
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);

@@ -12,6 +12,7 @@
 
 #include "app/commands.h"
 #include "sweep/file_io.h"
+#include "sweep/slurm.h"
 #include "sweep/supervisor.h"
 #include "sweep/sweep_file.h"
 #include "sweep/sweep_folder.h"
@@ -22,6 +23,7 @@ namespace arex::app {
 namespace {
 
 constexpr const char* kSelf = "/proc/self/exe";
+constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
 
 int cores() {
   cpu_set_t set;
@@ -95,28 +97,36 @@ int dry_run(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
   return 0;
 }
 
+// Empty also where there is no Slurm to ask.
+std::set<std::string> queued_or_none(const sim::SweepFolder& folder) {
+  try {
+    return sim::queued_runs(folder);
+  } catch (const sim::SlurmError&) {
+    return {};
+  }
+}
+
 int status(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
-  std::map<std::string, std::size_t> outcomes;
+  std::map<std::string, std::size_t> counts;
   std::size_t finished = 0;
-  std::size_t running = 0;
   const std::vector<std::string> partials = folder.partials();
+  const std::set<std::string> queued = queued_or_none(folder);
   const auto order = plan.flying_order();
   for (const sim::PlannedRun* run : order) {
     if (const auto summary = folder.summary(run->id)) {
       ++finished;
-      ++outcomes[(*summary)["outcome"].get<std::string>()];
-      continue;
+      ++counts[(*summary)["outcome"].get<std::string>()];
+    } else if (std::binary_search(partials.begin(), partials.end(), run->id)) {
+      ++counts["in flight"];
+    } else if (queued.count(run->id) > 0) {
+      ++counts["in Slurm's queue"];
+    } else {
+      const auto failure = folder.state(run->id).failure;
+      ++counts[std::string(sim::kFailureNames[static_cast<std::size_t>(failure)])];
     }
-    if (std::binary_search(partials.begin(), partials.end(), run->id)) {
-      ++running;
-      continue;
-    }
-    const auto failure = folder.state(run->id).failure;
-    ++outcomes[std::string(sim::kFailureNames[static_cast<std::size_t>(failure)])];
   }
-  std::printf("%s: %zu of %zu finished, %zu in flight", plan.name.c_str(), finished, order.size(),
-              running);
-  for (const auto& [outcome, count] : outcomes) std::printf(", %zu %s", count, outcome.c_str());
+  std::printf("%s: %zu of %zu finished", plan.name.c_str(), finished, order.size());
+  for (const auto& [what, count] : counts) std::printf(", %zu %s", count, what.c_str());
   std::printf("\n");
   return finished == order.size() ? 0 : 1;
 }
@@ -142,25 +152,62 @@ std::filesystem::path made_folder(const std::string& out) {
   return std::filesystem::canonical(out);
 }
 
-int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
+std::vector<sim::RunOrder> missing_runs(const sim::SweepPlan& plan,
+                                        const sim::SweepFolder& folder) {
   std::vector<sim::RunOrder> orders;
-  const auto all = plan.flying_order();
-  for (const sim::PlannedRun* run : all) {
+  for (const sim::PlannedRun* run : plan.flying_order()) {
     if (!folder.summary(run->id)) orders.push_back({run->id, run->scenario});
   }
-  SweepLine line(all.size() - orders.size(), all.size());
+  return orders;
+}
+
+[[noreturn]] void fail_on_full_disk(const sim::SweepFolder& folder) {
+  throw std::runtime_error(folder.root().string() +
+                           ": the disk is full; make room and give the same command again");
+}
+
+int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
+  sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
+  if (!workers.take()) {
+    throw ConfigError(folder.root().string() + ": Slurm's tasks are at work here, expected them " +
+                      "to be over; --status says how far they are");
+  }
+  folder.remove_all_partials();
+  const std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
+  const std::size_t total = plan.flying_order().size();
+  SweepLine line(total - orders.size(), total);
   sim::Supervisor supervisor(
       folder, kSelf, {jobs, plan.timeout_s, plan.retries},
       {[&](const auto& order, const auto& state) { line.broken(order, state); },
        [&](const auto& progress) { line.update(progress); }});
   const sim::SweepEnd end = supervisor.fly(orders);
-  if (end == sim::SweepEnd::kDiskFull) {
-    throw std::runtime_error(folder.root().string() + ": the disk is full; " +
-                             "make room and give the same command again");
-  }
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
   write_tables(plan, folder);
   if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
   return supervisor.progress().broken == 0 ? 0 : 1;
+}
+
+int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int at_a_time,
+           const std::vector<std::string>& options) {
+  {
+    // What killed jobs have left can go when no task is at work.
+    sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
+    if (workers.take()) folder.remove_all_partials();
+  }
+  std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
+  const std::size_t missing = orders.size();
+  const std::set<std::string> queued = sim::queued_runs(folder);
+  std::erase_if(orders, [&](const auto& order) { return queued.count(order.id) > 0; });
+  const auto batches = sim::submit(folder, plan, orders, kSelf, at_a_time, options);
+  for (const sim::SlurmBatch& batch : batches) {
+    std::printf("submitted %zu runs as job %s (%s)\n", batch.runs, batch.job_id.c_str(),
+                batch.name.c_str());
+  }
+  if (missing > orders.size()) {
+    std::printf("%zu runs are in Slurm's queue already\n", missing - orders.size());
+  }
+  write_tables(plan, folder);
+  return 0;
 }
 
 }  // namespace
@@ -180,10 +227,37 @@ int sweep(const SweepArguments& arguments) {
   lock.sign("process " + std::to_string(getpid()) + " on " + sim::host_name());
   warn_of_another_build(plan, folder);
   folder.prepare(plan);
-  folder.remove_all_partials();
-  const int result = fly(plan, folder, arguments.jobs > 0 ? arguments.jobs : cores());
+  const int result = arguments.slurm
+                         ? submit(plan, folder, arguments.jobs, arguments.sbatch_options)
+                         : fly(plan, folder, arguments.jobs > 0 ? arguments.jobs : cores());
   std::printf("%s\n", (folder.root() / "sweep.csv").c_str());
   return result;
+}
+
+int sweep_task(const SweepTaskArguments& arguments) {
+  const std::filesystem::path file = std::filesystem::absolute(arguments.batch);
+  const sim::BatchFile batch = sim::load_batch(file);
+  if (arguments.index >= batch.runs.size()) {
+    throw ConfigError(file.string() + ":1: has " + std::to_string(batch.runs.size()) +
+                      " runs, expected an index below that");
+  }
+  const sim::SweepFolder folder(file.parent_path().parent_path());
+  sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kShared);
+  if (!workers.take()) {
+    throw std::runtime_error(folder.root().string() + ": a local sweep is at work here");
+  }
+  const sim::RunOrder order = batch.runs[arguments.index];
+  if (folder.summary(order.id)) return 0;
+  sim::Supervisor supervisor(folder, kSelf, {1, batch.timeout_s, batch.retries},
+                             {[](const auto& broken, const auto& state) {
+                                std::fprintf(stderr, "%s: %s\n", broken.id.c_str(),
+                                             state.detail.c_str());
+                              },
+                              {}});
+  const sim::SweepEnd end = supervisor.fly({order});
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
+  if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
+  return supervisor.progress().broken == 0 ? 0 : 1;
 }
 
 }  // namespace arex::app

@@ -13,12 +13,13 @@
 #include <cmath>
 #include <csignal>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 namespace arex::sim {
 namespace {
 
-constexpr off_t kKeptOutput = 16 * 1024;
+constexpr off_t kKeptOutput = 16 << 20;
 
 // What is ignored on purpose, as under nohup, stays ignored.
 sigset_t gate_signals() {
@@ -45,7 +46,7 @@ sigset_t gate_signals() {
   dup2(output, STDERR_FILENO);
   const int null = open("/dev/null", O_RDONLY);
   dup2(null, STDIN_FILENO);
-  if (chdir(folder) == 0) execv(program, argv);
+  if (chdir(folder) == 0) execvp(program, argv);
   static constexpr char kMessage[] = "cannot be started\n";
   if (write(STDERR_FILENO, kMessage, sizeof kMessage - 1) < 0) _exit(126);
   _exit(127);
@@ -120,6 +121,14 @@ std::optional<ChildExit> ChildProcess::poll() {
   exit.max_rss_mb = static_cast<double>(usage.ru_maxrss) / 1024;
   exit.output = output();
   return exit;
+}
+
+std::optional<ChildExit> ChildProcess::wait(double longest_s) {
+  for (;;) {
+    if (std::optional<ChildExit> exit = poll()) return exit;
+    if (age_s() > longest_s) return std::nullopt;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
 }
 
 SignalGate::SignalGate() {

@@ -17,13 +17,14 @@ struct ChildExit {
   double wall_s = 0;
   double cpu_s = 0;
   double max_rss_mb = 0;
-  std::string output;  ///< the end of what it said on stdout and stderr
+  std::string output;  ///< what it said on stdout and stderr, of the last 16 MB
 };
 
 /// A process of ours: it dies with us, whatever ends us, and what it says needs no disk.
 class ChildProcess {
  public:
-  /// Starts `program` in `folder`. @throws std::system_error if there is no process to be had.
+  /// Starts `program`, looked for in PATH if it has no slash, in `folder`. @throws
+  /// std::system_error if there is no process to be had.
   ChildProcess(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                const std::filesystem::path& folder);
   /// Kills it if it still runs.
@@ -33,6 +34,8 @@ class ChildProcess {
 
   /// How it ended; nothing while it runs. Never waits.
   std::optional<ChildExit> poll();
+  /// Waits; nothing if it still runs then.
+  std::optional<ChildExit> wait(double longest_s);
   void kill();
   [[nodiscard]] double age_s() const;
   [[nodiscard]] pid_t pid() const { return pid_; }

@@ -14,6 +14,7 @@ namespace arex::sim {
 namespace {
 
 constexpr double kLongestWait_s = 0.5;  // between two looks at the clock
+constexpr std::size_t kKeptOutput = 16 * 1024;
 
 std::string last_line(const std::string& text) {
   const auto end = text.find_last_not_of("\n ");
@@ -39,6 +40,10 @@ RunState diagnose(const ChildExit& exit, bool overran, double timeout_s) {
   std::string detail = "exit code " + std::to_string(exit.exit_code);
   if (!said.empty()) detail += ": " + said;
   return {Failure::kUnfinished, detail};
+}
+
+std::string end_of(const std::string& text) {
+  return text.size() <= kKeptOutput ? text : text.substr(text.size() - kKeptOutput);
 }
 
 bool speaks_of_a_full_disk(const std::string& text) {
@@ -151,7 +156,7 @@ bool Supervisor::keep(const Flight& flight, const ChildExit& exit) {
                                     {"cpu_s", exit.cpu_s},
                                     {"max_rss_mb", exit.max_rss_mb}};
   write_atomically(partial / "host.json", host.dump(2) + "\n");
-  if (!exit.output.empty()) write_atomically(partial / "output.txt", exit.output);
+  if (!exit.output.empty()) write_atomically(partial / "output.txt", end_of(exit.output));
   if (!folder_.publish(order.id)) return false;
   folder_.log("finish", order.id, flight.attempt, "");
   ++progress_.finished;
@@ -164,7 +169,7 @@ void Supervisor::give_up(const RunOrder& order, const RunState& state, int attem
                          const std::string& output) {
   const auto partial = folder_.root() / SweepFolder::partial(order.id);
   std::filesystem::create_directories(partial);
-  if (!output.empty()) write_atomically(partial / "output.txt", output);
+  if (!output.empty()) write_atomically(partial / "output.txt", end_of(output));
   folder_.record_failure(order.id, state, attempts);
   ++progress_.broken;
   if (listener_.broken) listener_.broken(order, state);

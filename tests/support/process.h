@@ -1,6 +1,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -28,6 +29,7 @@ class Process {
       : out_(folder / "stdout"), err_(folder / "stderr") {
     pid_ = fork();
     if (pid_ != 0) return;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that dies leaves nothing behind
     dup2(creat(out_.c_str(), 0600), STDOUT_FILENO);
     dup2(creat(err_.c_str(), 0600), STDERR_FILENO);
     std::vector<char*> argv{const_cast<char*>(program.c_str())};

@@ -13,24 +13,22 @@ namespace arex {
 namespace {
 
 namespace fs = std::filesystem;
+using test::arex;
 using test::events_by_run;
+using test::expect_complete;
+using test::expect_untouched;
 using test::finished_runs;
 using test::invalid_runs;
 using test::kShortRuns;
 using test::lines_of;
+using test::marks_of;
 using test::Process;
 using test::ProcessResult;
 using test::read_text;
+using test::sweep_arguments;
 using test::TemporaryFolder;
+using test::wait_until;
 using test::write_text;
-
-ProcessResult arex(const std::vector<std::string>& arguments) {
-  return test::run_process(AREX_BINARY, arguments);
-}
-
-std::vector<std::string> sweep_arguments(const fs::path& file, const fs::path& out) {
-  return {"sweep", file.string(), "--out", out.string(), "--jobs", "2"};
-}
 
 std::vector<pid_t> children_of(pid_t pid) {
   const std::string id = std::to_string(pid);
@@ -47,51 +45,11 @@ bool dead(pid_t pid) {
   return name_end == std::string::npos || stat.substr(name_end + 2, 1) == "Z";
 }
 
-template <class Condition>
-bool wait_until(const Condition& condition) {
-  for (int i = 0; i < 6000; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
-
 std::size_t count_lines_with(const fs::path& file, const std::string& text) {
   const auto lines = lines_of(file);
   return static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), [&](const auto& line) {
     return line.find(text) != std::string::npos;
   }));
-}
-
-// What tells whether a finished run was touched again.
-std::map<std::string, std::pair<ino_t, fs::file_time_type>> marks_of(const fs::path& out) {
-  std::map<std::string, std::pair<ino_t, fs::file_time_type>> marks;
-  for (const std::string& id : finished_runs(out)) {
-    const fs::path file = out / "runs" / id / "summary.json";
-    struct stat status {};
-    stat(file.c_str(), &status);
-    marks[id] = {status.st_ino, fs::last_write_time(file)};
-  }
-  return marks;
-}
-
-void expect_untouched(const std::map<std::string, std::pair<ino_t, fs::file_time_type>>& before,
-                      const fs::path& out) {
-  auto after = marks_of(out);
-  for (const auto& [id, mark] : before) EXPECT_EQ(after[id], mark) << id;
-}
-
-void expect_complete(const fs::path& out, const fs::path& undisturbed) {
-  EXPECT_EQ(finished_runs(out).size(), std::size_t{kShortRuns});
-  EXPECT_EQ(invalid_runs(out), 0);
-  EXPECT_EQ(read_text(out / "sweep.csv"), read_text(undisturbed / "sweep.csv"));
-  for (const auto& [id, events] : events_by_run(out)) {
-    EXPECT_EQ(std::count(events.begin(), events.end(), "finish"), 1) << id;
-    EXPECT_EQ(events.back(), "finish") << id << " was flown again";
-  }
-  for (const auto& entry : fs::directory_iterator(out / "runs")) {
-    EXPECT_EQ(entry.path().filename().string().find('.'), std::string::npos) << entry.path();
-  }
 }
 
 /// The undisturbed sweep, flown once for all tests.

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
 #include <array>
 #include <filesystem>
 #include <map>
@@ -7,9 +10,10 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include "support/temporary_folder.h"
+#include "support/process.h"
 
 /// What the tests of a sweep's recovery write and read.
 namespace arex::test {
@@ -66,6 +70,58 @@ inline std::map<std::string, std::vector<std::string>> events_by_run(
     if (cell[3] != "event") events[cell[4]].push_back(cell[3]);
   }
   return events;
+}
+
+inline ProcessResult arex(const std::vector<std::string>& arguments) {
+  return run_process(AREX_BINARY, arguments);
+}
+
+inline std::vector<std::string> sweep_arguments(const std::filesystem::path& file,
+                                                const std::filesystem::path& out) {
+  return {"sweep", file.string(), "--out", out.string(), "--jobs", "2"};
+}
+
+template <class Condition>
+bool wait_until(const Condition& condition) {
+  for (int i = 0; i < 6000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+/// What tells whether a finished run was touched again.
+inline std::map<std::string, std::pair<ino_t, std::filesystem::file_time_type>> marks_of(
+    const std::filesystem::path& out) {
+  std::map<std::string, std::pair<ino_t, std::filesystem::file_time_type>> marks;
+  for (const std::string& id : finished_runs(out)) {
+    const std::filesystem::path file = out / "runs" / id / "summary.json";
+    struct stat status {};
+    stat(file.c_str(), &status);
+    marks[id] = {status.st_ino, std::filesystem::last_write_time(file)};
+  }
+  return marks;
+}
+
+inline void expect_untouched(
+    const std::map<std::string, std::pair<ino_t, std::filesystem::file_time_type>>& before,
+    const std::filesystem::path& out) {
+  auto after = marks_of(out);
+  for (const auto& [id, mark] : before) EXPECT_EQ(after[id], mark) << id;
+}
+
+inline void expect_complete(const std::filesystem::path& out,
+                            const std::filesystem::path& undisturbed) {
+  EXPECT_EQ(finished_runs(out).size(), std::size_t{kShortRuns});
+  EXPECT_EQ(invalid_runs(out), 0);
+  EXPECT_EQ(read_text(out / "sweep.csv"), read_text(undisturbed / "sweep.csv"));
+  for (const auto& [id, events] : events_by_run(out)) {
+    EXPECT_EQ(std::count(events.begin(), events.end(), "finish"), 1) << id;
+    EXPECT_EQ(events.back(), "finish") << id << " was flown again";
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(out / "runs")) {
+    EXPECT_EQ(entry.path().filename().string().find('.'), std::string::npos) << entry.path();
+  }
 }
 
 }  // namespace arex::test

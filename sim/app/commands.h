@@ -18,9 +18,11 @@ struct ScenarioArguments {
 
 struct RunArguments {
   ScenarioArguments scenario;
-  std::string out;   ///< empty: runs/<scenario>-seed<seed>
-  std::string name;  ///< of the scenario, in the summary; empty: the file's
-  std::string bag;   ///< ROS 1 bag to write; empty: none
+  std::string out;                        ///< empty: runs/<scenario>-seed<seed>
+  std::string name;                       ///< of the scenario, in the summary; empty: the file's
+  std::string bag;                        ///< ROS 1 bag to write; empty: none
+  std::vector<std::string> requirements;  ///< of the summary: field>=value
+  std::string junit;                      ///< JUnit file to write; empty: none
   int threads = 1;
   bool quiet = false;
 };

@@ -27,6 +27,11 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
   command->add_option("--name", arguments.name, "the scenario's name; default the file's");
   command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
+  command
+      ->add_option("--require", arguments.requirements,
+                   "field>=value of the summary, else exit code 1; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
   command->add_option("--threads", arguments.threads, "host threads; the result does not change")
       ->check(CLI::Range(1, 64));
   command->add_flag("--quiet", arguments.quiet, "no progress line");

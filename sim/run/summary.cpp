@@ -90,6 +90,21 @@ ordered_json planner_json(const FlightResult& result) {
   return nullptr;
 }
 
+void flatten_into(const ordered_json& value, const std::string& key,
+                  std::vector<std::pair<std::string, std::string>>& fields) {
+  if (value.is_object()) {
+    for (const auto& [name, child] : value.items()) {
+      flatten_into(child, key.empty() ? name : key + "." + name, fields);
+    }
+  } else if (value.is_array()) {
+    fields.emplace_back(key + ".count", std::to_string(value.size()));
+  } else if (value.is_null()) {
+    fields.emplace_back(key, "");
+  } else {
+    fields.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
 }  // namespace
 
 ordered_json summarise(const Scenario& scenario, const FlightResult& result, const HostTime& host) {
@@ -122,6 +137,23 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
       result.renderer.empty() ? ordered_json(nullptr) : ordered_json(result.renderer);
   json["build"] = {{"version", AREX_VERSION}, {"compiler", "g++ " __VERSION__}};
   return json;
+}
+
+std::vector<std::pair<std::string, std::string>> flatten(const ordered_json& summary) {
+  std::vector<std::pair<std::string, std::string>> fields;
+  flatten_into(summary, "", fields);
+  return fields;
+}
+
+ordered_json full_summary() {
+  FlightResult result;
+  result.map.emplace();
+  result.coverage.emplace();
+  for (ClassCoverage& c : result.coverage->classes) c.visible = 1;
+  result.plans = 1;
+  result.timing.push_back({"planner", 1, 0, 0, 0});
+  result.renderer = "any";
+  return summarise({}, result, {});
 }
 
 bool depends_on_host(std::string_view key) {

@@ -12,20 +12,6 @@ namespace {
 using nlohmann::ordered_json;
 using Fields = std::vector<std::pair<std::string, std::string>>;
 
-void flatten_into(const ordered_json& value, const std::string& key, Fields& fields) {
-  if (value.is_object()) {
-    for (const auto& [name, child] : value.items()) {
-      flatten_into(child, key.empty() ? name : key + "." + name, fields);
-    }
-  } else if (value.is_array()) {
-    fields.emplace_back(key + ".count", std::to_string(value.size()));
-  } else if (value.is_null()) {
-    fields.emplace_back(key, "");
-  } else {
-    fields.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
-  }
-}
-
 /// The columns of rows that do not all have the same ones.
 class Columns {
  public:
@@ -127,12 +113,6 @@ Fields part_of(const Fields& fields, bool host) {
 }
 
 }  // namespace
-
-Fields flatten(const ordered_json& summary) {
-  Fields fields;
-  flatten_into(summary, "", fields);
-  return fields;
-}
 
 SweepTables sweep_tables(const SweepPlan& plan, const SweepFolder& folder) {
   std::vector<std::string> head = identity_head(plan);

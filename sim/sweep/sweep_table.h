@@ -1,17 +1,10 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "sweep/sweep_folder.h"
 
 namespace arex::sim {
-
-/// Every number and text of a summary with its dotted key; a list by its length, as
-/// `targets.count`.
-std::vector<std::pair<std::string, std::string>> flatten(const nlohmann::ordered_json& summary);
 
 /// sweep.csv and sweep_host.csv.
 struct SweepTables {

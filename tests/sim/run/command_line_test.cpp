@@ -62,6 +62,8 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   expect_refused("seed: 1\n", {"--set", "seed"}, "expected key=value");
   expect_refused("seed: 1\n", {"--threads", "none"}, "--threads");
   expect_refused("seed: 1\n", {"--seed", "-1"}, "--seed");
+  expect_refused("seed: 1\n", {"--require", "colisions==0"}, "did you mean 'collisions'?");
+  expect_refused("seed: 1\n", {"--junit", "/does/not/exist/x.xml"}, "/does/not/exist/x.xml");
   expect_refused("seed: 1\n", {"--bag", "/does/not/exist/x.bag"}, "/does/not/exist/x.bag");
   const Result missing = run({"run", "/does/not/exist.yaml"});
   EXPECT_EQ(missing.exit_code, 2);
@@ -118,6 +120,34 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
   const auto summary_again = nlohmann::json::parse(read_text(folder / "b/summary.json"));
   EXPECT_EQ(summary_again["trajectory_hash"], summary["trajectory_hash"]);
   EXPECT_EQ(summary_again["sensor_hash"], summary["sensor_hash"]);
+}
+
+TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {
+  const TemporaryFolder folder;
+  const std::string junit = (folder / "junit.xml").string();
+  std::vector<std::string> arguments{"run",
+                                     AREX_SOURCE_DIR "/scenarios/yaw_burst.yaml",
+                                     "--set",
+                                     "mission.yaw_rates_radps=[1]",
+                                     "--set",
+                                     "mission.yaw_burst_s=1",
+                                     "--quiet",
+                                     "--out",
+                                     (folder / "run").string(),
+                                     "--junit",
+                                     junit,
+                                     "--require",
+                                     "collisions==0"};
+  const Result met = run(arguments);
+  EXPECT_EQ(met.exit_code, 0) << met.err;
+  EXPECT_NE(read_text(junit).find("tests=\"2\" failures=\"0\""), std::string::npos);
+  arguments.insert(arguments.end(), {"--require", "distance_m>=100"});
+  const Result violated = run(arguments);
+  EXPECT_EQ(violated.exit_code, 1);
+  EXPECT_EQ(violated.err.find("arex: required distance_m>=100, but distance_m is "), 0u)
+      << violated.err;
+  EXPECT_EQ(std::count(violated.err.begin(), violated.err.end(), '\n'), 1) << violated.err;
+  EXPECT_NE(read_text(junit).find("tests=\"3\" failures=\"1\""), std::string::npos);
 }
 
 TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {

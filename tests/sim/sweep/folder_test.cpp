@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "run/summary.h"
 #include "support/temporary_folder.h"
 #include "sweep/file_io.h"
 #include "sweep/sweep_table.h"

@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <list>
 #include <sstream>
 #include <thread>
 
@@ -87,8 +88,16 @@ bool append_line(const fs::path& file, const std::string& line) {
 }
 
 void sync_folder(const fs::path& folder) {
+  std::list<Descriptor> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file()) sync_path(entry.path(), O_RDONLY);
+    if (!entry.is_regular_file()) continue;
+    const Descriptor& file = files.emplace_back(entry.path(), O_RDONLY);
+    if (!file.valid()) fail(entry.path());
+    // All of them on their way first: the journal is then written once, not once a file.
+    sync_file_range(file.value(), 0, 0, SYNC_FILE_RANGE_WRITE);
+  }
+  for (const Descriptor& file : files) {
+    if (fsync(file.value()) != 0) fail(folder);
   }
   sync_names(folder);
 }

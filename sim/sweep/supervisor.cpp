@@ -70,12 +70,7 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
   }
   double told_s = -1;
   while (!flights_.empty() || (!waiting_.empty() && !disk_full_)) {
-    while (!disk_full_ && !waiting_.empty() &&
-           flights_.size() < static_cast<std::size_t>(options_.jobs)) {
-      const auto [order, attempt] = waiting_.back();
-      waiting_.pop_back();
-      start(*order, attempt);
-    }
+    refill();
     if (SignalGate::wait(kLongestWait_s) != 0) {
       stop_all();
       tell();
@@ -112,15 +107,29 @@ void Supervisor::kill_overdue() {
   }
 }
 
+void Supervisor::refill() {
+  while (!disk_full_ && !waiting_.empty() &&
+         flights_.size() < static_cast<std::size_t>(options_.jobs)) {
+    const auto [order, attempt] = waiting_.back();
+    waiting_.pop_back();
+    start(*order, attempt);
+  }
+}
+
 void Supervisor::collect() {
+  std::list<std::pair<Flight, ChildExit>> ended;
   for (auto flight = flights_.begin(); flight != flights_.end();) {
-    const std::optional<ChildExit> exit = flight->process.poll();
-    if (!exit) {
+    std::optional<ChildExit> exit = flight->process.poll();
+    if (exit) {
+      ended.emplace_back(std::move(*flight), std::move(*exit));
+      flight = flights_.erase(flight);
+    } else {
       ++flight;
-      continue;
     }
-    if (!settle(*flight, *exit)) waiting_.emplace_back(flight->order, flight->attempt + 1);
-    flight = flights_.erase(flight);
+  }
+  refill();  // no core waits for the disk
+  for (const auto& [flight, exit] : ended) {
+    if (!settle(flight, exit)) waiting_.emplace_back(flight.order, flight.attempt + 1);
   }
 }
 

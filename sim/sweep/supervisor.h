@@ -63,6 +63,7 @@ class Supervisor {
   };
 
   void start(const RunOrder& order, int attempt);
+  void refill();
   void kill_overdue();
   void collect();
   /// @return whether the run is done with, one way or the other.

@@ -23,6 +23,7 @@ namespace arex::app {
 namespace {
 
 constexpr const char* kSelf = "/proc/self/exe";
+constexpr double kTablePeriod_s = 60;             // a long sweep can be looked at while it flies
 constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
 
 int cores() {
@@ -176,10 +177,20 @@ int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
   const std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
   const std::size_t total = plan.flying_order().size();
   SweepLine line(total - orders.size(), total);
+  double next_table_s = kTablePeriod_s;
   sim::Supervisor supervisor(
       folder, kSelf, {jobs, plan.timeout_s, plan.retries},
       {[&](const auto& order, const auto& state) { line.broken(order, state); },
-       [&](const auto& progress) { line.update(progress); }});
+       [&](const auto& progress) {
+         line.update(progress);
+         if (progress.elapsed_s < next_table_s) return;
+         next_table_s = progress.elapsed_s + kTablePeriod_s;
+         try {
+           write_tables(plan, folder);
+         } catch (const sim::DiskError&) {
+           // The next run finds out what is wrong with the disk.
+         }
+       }});
   const sim::SweepEnd end = supervisor.fly(orders);
   if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
   write_tables(plan, folder);

@@ -7,9 +7,9 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
-#include <list>
 #include <sstream>
 #include <thread>
+#include <vector>
 
 namespace arex::sim {
 namespace {
@@ -68,12 +68,12 @@ std::string read_file(const fs::path& file) {
   return text.str();
 }
 
-void write_atomically(const fs::path& file, const std::string& text) {
+void write_atomically(const fs::path& file, const std::string& text, bool durable) {
   fs::path temporary = file;
   temporary += "." + std::to_string(getpid()) + ".partial";
   const bool written = [&] {
     const Descriptor out(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    return out.valid() && write_all(out.value(), text) && fsync(out.value()) == 0;
+    return out.valid() && write_all(out.value(), text) && (!durable || fsync(out.value()) == 0);
   }();
   if (written && rename(temporary.c_str(), file.c_str()) == 0) return;
   const int error = errno;
@@ -88,17 +88,16 @@ bool append_line(const fs::path& file, const std::string& line) {
 }
 
 void sync_folder(const fs::path& folder) {
-  std::list<Descriptor> files;
+  std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
-    const Descriptor& file = files.emplace_back(entry.path(), O_RDONLY);
-    if (!file.valid()) fail(entry.path());
-    // All of them on their way first: the journal is then written once, not once a file.
-    sync_file_range(file.value(), 0, 0, SYNC_FILE_RANGE_WRITE);
+    if (entry.is_regular_file()) files.push_back(entry.path());
   }
-  for (const Descriptor& file : files) {
-    if (fsync(file.value()) != 0) fail(folder);
+  // All of them on their way first: the journal is then written once, not once a file.
+  for (const fs::path& path : files) {
+    const Descriptor file(path, O_RDONLY);
+    if (file.valid()) sync_file_range(file.value(), 0, 0, SYNC_FILE_RANGE_WRITE);
   }
+  for (const fs::path& path : files) sync_path(path, O_RDONLY);
   sync_names(folder);
 }
 

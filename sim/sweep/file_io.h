@@ -17,7 +17,9 @@ class DiskError : public std::filesystem::filesystem_error {
 std::string read_file(const std::filesystem::path& file);
 
 /// Writes a file of its own and renames it into place: readers see the old text or the new one.
-void write_atomically(const std::filesystem::path& file, const std::string& text);
+/// @param durable also after a power cut; otherwise sync_folder() sees to that
+void write_atomically(const std::filesystem::path& file, const std::string& text,
+                      bool durable = true);
 
 /// Appends one line in one write: lines of several writers do not mix. @return whether it worked.
 bool append_line(const std::filesystem::path& file, const std::string& line);

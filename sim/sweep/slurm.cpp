@@ -19,6 +19,7 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kDefaultMaxArraySize = 1001;  // Slurm's own default
 constexpr double kPatience_s = 120;                 // with a controller that does not answer
+constexpr int kNotFound = 127;                      // as in a shell
 constexpr int kTimeMargin_min = 2;                  // to start, to write, to be scheduled out
 
 /// What a command of Slurm answers. @throws SlurmError if it fails.
@@ -27,6 +28,9 @@ std::string ask(const std::string& program, const std::vector<std::string>& argu
   ChildProcess process(program, arguments, folder);
   const auto exit = process.wait(kPatience_s);
   if (!exit) throw SlurmError(program + " does not answer");
+  if (exit->exit_code == kNotFound) {
+    throw SlurmError(program + ": not found, expected Slurm's commands in PATH");
+  }
   if (exit->exit_code != 0) {
     std::string said = exit->output.empty() ? program + " failed" : exit->output;
     while (!said.empty() && said.back() == '\n') said.pop_back();

@@ -60,8 +60,9 @@ void SweepFolder::prepare(const SweepPlan& plan) const {
   }
   for (const PlannedRun& run : plan.runs) {
     const fs::path file = root_ / configuration(run.id);
-    if (read_file(file) != run.resolved) write_atomically(file, run.resolved);
+    if (read_file(file) != run.resolved) write_atomically(file, run.resolved, false);
   }
+  sync_folder(root_ / "plan");
   const ordered_json sweep{{"name", plan.name},       {"build", plan.build},
                            {"keys", plan.keys},       {"variants", plan.has_variants},
                            {"repeats", plan.repeats}, {"timeout_s", plan.timeout_s},

@@ -84,8 +84,9 @@ class Table {
 };
 
 // What identifies a run, in the order of the head.
-std::vector<std::string> identity(const SweepPlan& plan, const PlannedRun& run) {
-  std::vector<std::string> cells{SweepFolder::finished(run.id).string(), run.scenario};
+std::vector<std::string> identity(const SweepPlan& plan, const PlannedRun& run,
+                                  const std::filesystem::path& folder) {
+  std::vector<std::string> cells{folder.string(), run.scenario};
   if (plan.has_variants) cells.push_back(run.variant);
   cells.insert(cells.end(), run.values.begin(), run.values.end());
   cells.push_back(std::to_string(run.seed));
@@ -120,13 +121,15 @@ SweepTables sweep_tables(const SweepPlan& plan, const SweepFolder& folder) {
   head.insert(head.end(), {"failure", "detail"});
   Table results(head);
   for (const PlannedRun& run : plan.runs) {
-    std::vector<std::string> cells = identity(plan, run);
     const auto summary = folder.summary(run.id);
+    const RunState state = summary ? RunState{Failure::kNone, ""} : folder.state(run.id);
+    const bool whole = state.failure == Failure::kNone || state.failure == Failure::kMissing;
+    std::vector<std::string> cells =
+        identity(plan, run, whole ? SweepFolder::finished(run.id) : SweepFolder::failed(run.id));
     const Fields fields = summary ? flatten(*summary) : Fields{};
     Fields clocks = summary ? flatten(folder.host(run.id)) : Fields{};
     for (auto& field : part_of(fields, true)) clocks.push_back(std::move(field));
     host.add(cells, std::move(clocks));
-    const RunState state = summary ? RunState{Failure::kNone, ""} : folder.state(run.id);
     cells.emplace_back(kFailureNames[static_cast<std::size_t>(state.failure)]);
     cells.push_back(state.detail);
     results.add(std::move(cells), part_of(fields, false));

@@ -24,7 +24,11 @@ namespace {
 
 constexpr const char* kSelf = "/proc/self/exe";
 constexpr double kTablePeriod_s = 60;             // a long sweep can be looked at while it flies
+constexpr const char* kDriverLock = ".lock";      // of the local sweep or the submission
 constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
+// A look whether someone is at work holds a lock for a moment.
+constexpr double kPatience_s = 2;
+constexpr double kTaskPatience_s = 60;
 
 int cores() {
   cpu_set_t set;
@@ -107,10 +111,24 @@ std::set<std::string> queued_or_none(const sim::SweepFolder& folder) {
   }
 }
 
+// Whether what looks as if it were in flight is: what a killed sweep has left does not count.
+bool at_work(const sim::SweepFolder& folder) {
+  if (!std::filesystem::exists(folder.root() / kDriverLock)) return false;
+  try {
+    for (const char* name : {kDriverLock, kWorkersLock}) {
+      if (!sim::FileLock(folder.root() / name, sim::FileLock::Mode::kExclusive).take()) return true;
+    }
+    return false;
+  } catch (const sim::DiskError&) {
+    return true;  // somebody else's folder: one can only look
+  }
+}
+
 int status(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
   std::map<std::string, std::size_t> counts;
   std::size_t finished = 0;
-  const std::vector<std::string> partials = folder.partials();
+  const std::vector<std::string> partials =
+      at_work(folder) ? folder.partials() : std::vector<std::string>{};
   const std::set<std::string> queued = queued_or_none(folder);
   const auto order = plan.flying_order();
   for (const sim::PlannedRun* run : order) {
@@ -169,7 +187,7 @@ std::vector<sim::RunOrder> missing_runs(const sim::SweepPlan& plan,
 
 int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
   sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
-  if (!workers.take()) {
+  if (!workers.take(kPatience_s)) {
     throw ConfigError(folder.root().string() + ": Slurm's tasks are at work here, expected them " +
                       "to be over; --status says how far they are");
   }
@@ -205,9 +223,10 @@ int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int at_a_
     sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
     if (workers.take()) folder.remove_all_partials();
   }
+  // The queue first: what leaves it after this look is finished at the next, or really missing.
+  const std::set<std::string> queued = sim::queued_runs(folder);
   std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
   const std::size_t missing = orders.size();
-  const std::set<std::string> queued = sim::queued_runs(folder);
   std::erase_if(orders, [&](const auto& order) { return queued.count(order.id) > 0; });
   const auto batches = sim::submit(folder, plan, orders, kSelf, at_a_time, options);
   for (const sim::SlurmBatch& batch : batches) {
@@ -230,8 +249,8 @@ int sweep(const SweepArguments& arguments) {
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 
   const sim::SweepFolder folder(made_folder(arguments.out));
-  sim::FileLock lock(folder.root() / ".lock", sim::FileLock::Mode::kExclusive);
-  if (!lock.take()) {
+  sim::FileLock lock(folder.root() / kDriverLock, sim::FileLock::Mode::kExclusive);
+  if (!lock.take(kPatience_s)) {
     throw ConfigError(arguments.out + ": another sweep is at work here (" + lock.holder() +
                       "), expected a folder of its own");
   }
@@ -254,7 +273,7 @@ int sweep_task(const SweepTaskArguments& arguments) {
   }
   const sim::SweepFolder folder(file.parent_path().parent_path());
   sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kShared);
-  if (!workers.take()) {
+  if (!workers.take(kTaskPatience_s)) {
     throw std::runtime_error(folder.root().string() + ": a local sweep is at work here");
   }
   const sim::RunOrder order = batch.runs[arguments.index];

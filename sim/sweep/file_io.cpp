@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -131,9 +132,15 @@ FileLock::FileLock(const fs::path& file, Mode mode) : file_(file), mode_(mode) {
 
 FileLock::~FileLock() { close(descriptor_); }
 
-bool FileLock::take() {
+bool FileLock::take(double patience_s) {
+  constexpr auto kPause = std::chrono::milliseconds(50);
   const int mode = mode_ == Mode::kShared ? LOCK_SH : LOCK_EX;
-  return flock(descriptor_, mode | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience_s);
+  for (;;) {
+    if (flock(descriptor_, mode | LOCK_NB) == 0 || errno != EWOULDBLOCK) return true;
+    if (std::chrono::steady_clock::now() >= end) return false;
+    std::this_thread::sleep_for(kPause);
+  }
 }
 
 std::string FileLock::holder() const { return read_file(file_); }

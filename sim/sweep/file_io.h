@@ -45,9 +45,9 @@ class FileLock {
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 
-  /// Tries to take it. @return whether this object holds it. A file system without locks gives it
-  /// to everyone.
-  bool take();
+  /// Tries to take it, for so long. @return whether this object holds it. A file system without
+  /// locks gives it to everyone.
+  bool take(double patience_s = 0);
   /// What the holder wrote about itself.
   [[nodiscard]] std::string holder() const;
   /// Writes who holds it; of an exclusive lock.

@@ -88,6 +88,12 @@ TEST_F(SweepRecovery, SurvivesTheDeathOfTwoRunsAndOfTheDriver) {
   EXPECT_LT(finished_runs(out).size(), std::size_t{kShortRuns});
   EXPECT_EQ(invalid_runs(out), 0);
   const auto before = marks_of(out);
+  auto status = sweep_arguments(file(), out);
+  status.push_back("--status");
+  const std::string said = arex(status).out;
+  EXPECT_NE(said.find(std::to_string(before.size()) + " of 48 finished"), std::string::npos)
+      << said;
+  EXPECT_EQ(said.find("in flight"), std::string::npos) << said;  // no longer
   const ProcessResult resumed = arex(sweep_arguments(file(), out));
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
   expect_untouched(before, out);

@@ -115,10 +115,16 @@ inline void expect_complete(const std::filesystem::path& out,
   EXPECT_EQ(finished_runs(out).size(), std::size_t{kShortRuns});
   EXPECT_EQ(invalid_runs(out), 0);
   EXPECT_EQ(read_text(out / "sweep.csv"), read_text(undisturbed / "sweep.csv"));
+  int unlogged = 0;  // whose driver was killed between the rename and the log
   for (const auto& [id, events] : events_by_run(out)) {
-    EXPECT_EQ(std::count(events.begin(), events.end(), "finish"), 1) << id;
-    EXPECT_EQ(events.back(), "finish") << id << " was flown again";
+    const auto finish = std::find(events.begin(), events.end(), "finish");
+    if (finish == events.end()) {
+      ++unlogged;
+    } else {
+      EXPECT_EQ(finish + 1, events.end()) << id << " was flown again";
+    }
   }
+  EXPECT_LE(unlogged, 2);
   for (const auto& entry : std::filesystem::directory_iterator(out / "runs")) {
     EXPECT_EQ(entry.path().filename().string().find('.'), std::string::npos) << entry.path();
   }

@@ -194,10 +194,12 @@ TEST_F(SweepRecovery, AnInterruptStopsItAndTheSameCommandGoesOn) {
   const fs::path out = folder / "out";
   const Process driver(AREX_BINARY, sweep_arguments(file(), out), folder.path());
   ASSERT_TRUE(wait_until([&] { return finished_runs(out).size() >= 4; }));
+  driver.signal(SIGSTOP);  // it holds its lock, and nothing ends meanwhile
   const ProcessResult second = arex(sweep_arguments(file(), out));
   EXPECT_EQ(second.exit_code, 2);
   EXPECT_NE(second.err.find("another sweep is at work here"), std::string::npos) << second.err;
   driver.signal(SIGINT);
+  driver.signal(SIGCONT);
   EXPECT_EQ(driver.wait().exit_code, 128 + SIGINT);
   const std::size_t done = finished_runs(out).size();
   EXPECT_LT(done, std::size_t{kShortRuns});

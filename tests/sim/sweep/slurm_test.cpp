@@ -74,9 +74,10 @@ TEST(SlurmSweep, FliesWhatIsMissingAndSurvivesKilledJobs) {
   EXPECT_NE(again.out.find("in Slurm's queue already"), std::string::npos) << again.out;
 
   // A task is killed where it stands, then the second array is cancelled while it flies.
-  pid_t victim = 0;
-  ASSERT_TRUE(wait_until([&] { return (victim = task_at_work(out)) != 0; })) << cluster.logs();
-  EXPECT_EQ(kill(victim, SIGKILL), 0);
+  ASSERT_TRUE(wait_until([&] {
+    const pid_t victim = task_at_work(out);
+    return victim != 0 && kill(victim, SIGKILL) == 0;
+  })) << cluster.logs();
   ASSERT_TRUE(wait_until([] {
     return run_process("squeue", {"--noheader", "--states=R", "--format=%F"}).out.find("2") !=
            std::string::npos;

@@ -7,7 +7,7 @@ namespace arex {
 /// What the filter believes of the IMU, and how it starts.
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
-  double gyro_noise_density = 3e-4;         ///< rad/s/sqrt(Hz)
+  double gyro_noise_density = 2e-4;         ///< rad/s/sqrt(Hz)
   double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
   double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
   double gyro_walk_density = 2e-5;          ///< rad/s^2/sqrt(Hz)
@@ -20,7 +20,7 @@ struct ImuNoiseConfig {
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
     f("gyro_noise_density", gyro_noise_density,
-      "rad/s/sqrt(Hz): three times the sensor's white noise (reference.md, 4), for aliased "
+      "rad/s/sqrt(Hz): twice the white noise of the sensor (reference.md, 4), for aliased "
       "vibration; more lets scans of a small scene tilt a vehicle that stands still");
     f("gyro_scale_noise_density", gyro_scale_noise_density,
       "1/sqrt(Hz), times the rate: errors of scale and alignment");
@@ -135,8 +135,8 @@ struct SurfelMapConfig {
 
 /// Matching of one scan.
 struct RegistrationConfig {
-  double scan_voxel_m = 0.3;
-  int max_points = 2500;
+  double scan_voxel_m = 0.2;
+  int max_points = 4000;
   int max_iterations = 4;
   double converged_rad = 1e-4;
   double converged_m = 1e-3;

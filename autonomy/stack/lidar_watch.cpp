@@ -1,35 +1,82 @@
 #include "stack/lidar_watch.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace arex {
 
-void LidarWatch::add_scan(Stamp now, std::size_t points) {
-  if (points >= static_cast<std::size_t>(config_.least_points)) last_scan_ = now;
+LidarWatch::Survey LidarWatch::survey(const LidarScan& scan) const {
+  const auto period = static_cast<std::uint32_t>(std::lround(config_.firing_period_s * 1e9));
+  const std::size_t firings = static_cast<std::size_t>(scan.end - scan.stamp) / period;
+  std::vector<float> range(firings, 0);
+  for (const LidarPoint& point : scan.points) {
+    const std::size_t i = point.offset_ns / period;
+    if (i < firings) range[i] = point.p_L.norm();
+  }
+  Survey out;
+  const auto next = static_cast<std::size_t>(config_.lines);
+  const auto same = static_cast<float>(config_.same_surface_fraction);
+  const auto spike = static_cast<float>(config_.spike_fraction);
+  for (std::size_t i = next; i + next < firings; ++i) {
+    const float before = range[i - next], after = range[i + next];
+    if (before == 0 || after == 0 || std::abs(before - after) > same * std::min(before, after)) {
+      continue;
+    }
+    ++out.between;
+    const float expected = 0.5F * (before + after);
+    if (range[i] == 0) {
+      ++out.missing;
+    } else if (std::abs(range[i] - expected) > spike * expected) {
+      ++out.spikes;
+    }
+  }
+  return out;
+}
+
+void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
+  if (scan.points.size() < static_cast<std::size_t>(config_.least_points)) return;
+  if (last_scan_ >= 0 && now - last_scan_ > from_seconds(config_.silent_after_s)) {
+    sound_in_a_row_ = 0;
+  }
+  last_scan_ = now;
+  const Survey s = survey(scan);
+  if (s.between < config_.least_points) return;
+  const double share = static_cast<double>(s.spikes) / s.between;
+  if (usual_spikes_ < 0) usual_spikes_ = share;
+  missing_ = s.missing > config_.missing_share * s.between;
+  spikes_ = share > usual_spikes_ + config_.false_share;
+  // What is false does not become usual.
+  if (!spikes_) usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
+  sound_in_a_row_ = missing_ || spikes_ || refused_ ? 0 : sound_in_a_row_ + 1;
 }
 
 void LidarWatch::add_registration(const RegistrationReport& report) {
   if (report.points == 0) return;
   const double share = static_cast<double>(report.matched) / report.points;
-  false_returns_ = share < config_.refused_fraction * usual_share_;
-  if (usual_share_ == 0) usual_share_ = share;
-  // What is false does not become usual.
-  if (!false_returns_) usual_share_ += (share - usual_share_) / config_.memory_scans;
+  if (usual_matched_ < 0) usual_matched_ = share;
+  refused_ = share < config_.refused_fraction * usual_matched_;
+  if (!refused_) usual_matched_ += (share - usual_matched_) / config_.memory_scans;
+}
+
+LidarWatch::State LidarWatch::newest(Stamp now) const {
+  if (now - last_scan_ > from_seconds(config_.silent_after_s)) return State::kSilent;
+  if (spikes_ || refused_) return State::kFalse;
+  return missing_ ? State::kMissing : State::kSound;
 }
 
 std::optional<std::string_view> LidarWatch::update(Stamp now) {
   if (last_scan_ < 0) return std::nullopt;
-  State state = State::kSound;
-  if (now - last_scan_ > from_seconds(config_.silent_after_s)) {
-    state = State::kSilent;
-  } else if (false_returns_) {
-    state = State::kFalse;
-  }
+  const State state = newest(now);
   if (state == state_) return std::nullopt;
+  if (state == State::kSound && sound_in_a_row_ < config_.sound_scans) return std::nullopt;
   state_ = state;
   switch (state) {
     case State::kSilent:
       return "lidar silent";
+    case State::kMissing:
+      return "lidar returns missing";
     case State::kFalse:
-      return "lidar returns refused";
+      return "lidar returns false";
     default:
       return "lidar sound again";
   }

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
-#include "math/types.h"
+#include "messages/sensors.h"
 #include "odometry/registration.h"
 
 namespace arex {
@@ -11,39 +13,74 @@ namespace arex {
 struct LidarWatchConfig {
   double silent_after_s = 0.25;
   int least_points = 500;
+  double firing_period_s = 5e-6;
+  int lines = 4;
+  double same_surface_fraction = 0.03;
+  double spike_fraction = 0.2;
+  double missing_share = 0.15;
+  double false_share = 0.05;
   double refused_fraction = 0.75;
   double memory_scans = 20;
+  int sound_scans = 3;
 
   void fields(auto& f) {
     f("silent_after_s", silent_after_s, "without a scan for longer: silent");
     f("least_points", least_points, "a scan of fewer returns is none");
+    f("firing_period_s", firing_period_s, "between firings (MID-360: 200,000 a second)");
+    f("lines", lines, "laser lines, fired in turn (MID-360)");
+    f("same_surface_fraction", same_surface_fraction,
+      "a line's firings before and after one lie on one surface if their ranges differ by less");
+    f("spike_fraction", spike_fraction, "and the one is a spike if its range differs by more");
+    f("missing_share", missing_share,
+      "more of the firings between returns of one surface without a return: returns are missing "
+      "(forest 0.04-0.10, garage 0.01-0.04; a fifth lost: above 0.18)");
+    f("false_share", false_share,
+      "share of spikes above the usual one: returns are false (sound, above usual: 0.03; a tenth "
+      "false: 0.07)");
     f("refused_fraction", refused_fraction,
-      "less than this share of the usual matched share: the returns are false");
-    f("memory_scans", memory_scans, "over which the usual share is averaged");
+      "less than this share of the usual matched share: returns are false");
+    f("memory_scans", memory_scans, "over which the usual shares are averaged");
+    f("sound_scans", sound_scans, "in a row before it is called sound again");
     f.check(silent_after_s > 0 && memory_scans >= 1, "silent_after_s > 0, memory_scans >= 1");
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");
+    f.check(firing_period_s > 0 && lines >= 1, "firing_period_s > 0, lines >= 1");
   }
 };
 
-/// Says when the LiDAR fails and when it is sound again.
+/// Says when the LiDAR fails and when it is sound again, whatever the scene: two firings of one
+/// line that hit one surface tell what the firing between them should have met. A share of them
+/// without a return, or with one elsewhere, is the device's doing.
 class LidarWatch {
  public:
   explicit LidarWatch(const LidarWatchConfig& config) : config_(config) {}
 
-  /// A scan of so many returns came.
-  void add_scan(Stamp now, std::size_t points);
+  /// What the firings between returns of one surface did.
+  struct Survey {
+    int between = 0;
+    int missing = 0;  ///< no return
+    int spikes = 0;   ///< a return elsewhere
+  };
+  [[nodiscard]] Survey survey(const LidarScan& scan) const;
+
+  void add_scan(Stamp now, const LidarScan& scan);
   /// What the odometry made of a scan.
   void add_registration(const RegistrationReport& report);
   /// @return what changed since the last call, for an event.
   std::optional<std::string_view> update(Stamp now);
 
  private:
-  enum class State { kSound, kSilent, kFalse };
+  enum class State : std::uint8_t { kSound, kSilent, kMissing, kFalse };
+
+  [[nodiscard]] State newest(Stamp now) const;
 
   LidarWatchConfig config_;
-  Stamp last_scan_ = -1;         ///< with returns; none yet: -1
-  double usual_share_ = 0;       ///< of the scan's points, matched; none yet: 0
-  bool false_returns_ = false;   ///< the newest scan
+  Stamp last_scan_ = -1;       ///< with returns; none yet: -1
+  double usual_spikes_ = -1;   ///< share; none yet: -1
+  double usual_matched_ = -1;  ///< share of the scan's points; none yet: -1
+  bool missing_ = false;       ///< in the newest scan
+  bool spikes_ = false;        ///< in the newest scan
+  bool refused_ = false;       ///< the newest scan
+  int sound_in_a_row_ = 0;
   State state_ = State::kSound;  ///< as told
 };
 

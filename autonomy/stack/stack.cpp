@@ -46,7 +46,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
-  lidar_watch_.add_scan(now_, scan->points.size());
+  lidar_watch_.add_scan(now_, *scan);
   if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) {
     perception_.add_scan(now_, scan);
     return;

@@ -43,10 +43,14 @@ struct PatternArguments {
 int pattern(const PatternArguments& arguments);
 
 struct RenderArguments {
-  std::string folder;            ///< a run folder
-  std::string out;               ///< picture to write
-  std::string view = "chase";    ///< or top
-  std::optional<double> time_s;  ///< moment of the flight; default its middle
+  std::string folder;  ///< a run folder
+  std::string out;     ///< FILE.png: a picture; FILE.mp4: a film
+  std::string view;    ///< chase, top or both; empty: chase for a picture, both for a film
+  std::optional<double> time_s;  ///< of a picture; default the middle of the flight
+  std::optional<double> from_s;  ///< of a film; default the flight's start
+  std::optional<double> to_s;    ///< of a film; default the flight's end
+  int fps = 25;
+  double speed = 8;  ///< seconds of flight in a second of film
 };
 int render(const RenderArguments& arguments);
 
@@ -67,6 +71,12 @@ struct SweepTaskArguments {
   std::size_t index = 0;
 };
 int sweep_task(const SweepTaskArguments& arguments);
+
+struct ReportArguments {
+  std::vector<std::string> folders;  ///< run folders and sweeps
+  bool runs = false;                 ///< also of every run of a sweep
+};
+int report(const ReportArguments& arguments);
 
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);

@@ -59,12 +59,23 @@ void add_pattern(CLI::App& app, PatternArguments& arguments, int& exit_code) {
 }
 
 void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
-  auto* command = app.add_subcommand("render", "draw a recorded flight");
+  auto* command = app.add_subcommand("render", "draw a recorded flight, a picture or a film");
   command->add_option("folder", arguments.folder, "run folder")->required();
-  command->add_option("--out", arguments.out, "PNG file to write")->required();
-  command->add_option("--view", arguments.view, "chase or top")
-      ->check(CLI::IsMember({"chase", "top"}));
-  command->add_option("--time", arguments.time_s, "moment of the flight, s; default its middle");
+  command->add_option("--out", arguments.out, "FILE.png or FILE.mp4")->required();
+  command
+      ->add_option("--view", arguments.view,
+                   "chase, top or both; default chase for a picture, both for a film")
+      ->check(CLI::IsMember({"chase", "top", "both"}));
+  command->add_option("--time", arguments.time_s,
+                      "moment of a picture, s; default the flight's middle");
+  command->add_option("--from", arguments.from_s, "start of a film, s; default the flight's");
+  command->add_option("--to", arguments.to_s, "end of a film, s; default the flight's");
+  command->add_option("--fps", arguments.fps, "frames of a second of film")
+      ->check(CLI::Range(1, 120))
+      ->capture_default_str();
+  command->add_option("--speed", arguments.speed, "seconds of flight in a second of film")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->callback([&] { exit_code = render(arguments); });
 }
 
@@ -98,6 +109,16 @@ std::vector<std::string> take_sbatch_options(std::vector<std::string>& arguments
   return options;
 }
 
+void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("report", "write report.html beside recorded data");
+  command
+      ->add_option("folders", arguments.folders,
+                   "run folders, folders of sweeps; several are compared")
+      ->required();
+  command->add_flag("--runs", arguments.runs, "also a report of every run of a sweep");
+  command->callback([&] { exit_code = report(arguments); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -110,6 +131,7 @@ int main(int argc, char** argv) {
   RenderArguments render_arguments;
   SweepArguments sweep_arguments;
   SweepTaskArguments sweep_task_arguments;
+  ReportArguments report_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   add_run(app, run_arguments, exit_code);
@@ -118,6 +140,7 @@ int main(int argc, char** argv) {
   add_render(app, render_arguments, exit_code);
   add_sweep(app, sweep_arguments, exit_code);
   add_sweep_task(app, sweep_task_arguments, exit_code);
+  add_report(app, report_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });

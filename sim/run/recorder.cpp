@@ -16,9 +16,10 @@ namespace {
 
 // Every file of the contract: what an older run in the same folder may have left.
 constexpr const char* kContractFiles[] = {
-    "summary.json", "resolved.yaml", "truth.tum",  "estimate.tum",  "coverage.csv",
-    "events.csv",   "timing.csv",    "cloud.pcd",  "map.bt",        "map2d.pgm",
-    "map2d.yaml",   "report.html",   "flight.csv", "decisions.csv", "odometry_error.csv"};
+    "summary.json", "resolved.yaml", "truth.tum",          "estimate.tum",
+    "coverage.csv", "events.csv",    "timing.csv",         "cloud.pcd",
+    "map.bt",       "map2d.pgm",     "map2d.yaml",         "report.html",
+    "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv"};
 
 [[noreturn]] void fail(const std::filesystem::path& file) {
   throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
@@ -126,15 +127,23 @@ void Recorder::check(std::FILE* file, const char* name) {
   if (std::fflush(file) != 0 || std::ferror(file) != 0) fail(directory_ / name);
 }
 
-void Recorder::write_cloud(const std::vector<Vec3f>& points_O) const {
+void Recorder::write_cloud(const std::vector<Vec3f>& points_O,
+                           const std::vector<CloudGrowth>& growth) const {
   if (!write_pcd(directory_ / "cloud.pcd", points_O)) fail(directory_ / "cloud.pcd");
+  std::string csv = "time_s,points\n";
+  std::array<char, 64> line{};
+  for (const CloudGrowth& row : growth) {
+    std::snprintf(line.data(), line.size(), "%.3f,%zu\n", to_seconds(row.stamp), row.points);
+    csv += line.data();
+  }
+  write_file("cloud_growth.csv", csv);
 }
 
 void Recorder::write_maps(const Mapper& mapper) const {
   if (!mapper.write(directory_)) fail(directory_ / "map.bt");
 }
 
-void Recorder::write_file(const std::string& name, const std::string& content) {
+void Recorder::write_file(const std::string& name, const std::string& content) const {
   const std::filesystem::path final_path = directory_ / name;
   const std::filesystem::path temporary = directory_ / (name + ".partial");
   File file(std::fopen(temporary.c_str(), "w"), &std::fclose);

@@ -28,6 +28,13 @@ struct FlightRow {
   double battery_fraction = 1;  ///< state of charge
 };
 
+/// How many points the cloud had at a moment. Points are in the order of their first sight, so that
+/// the first `points` of cloud.pcd are the map of that moment.
+struct CloudGrowth {
+  Stamp stamp = 0;
+  std::size_t points = 0;
+};
+
 /// The run folder. Everything but the summary is written while flying, so that a killed run leaves
 /// what it had; the summary is written last and atomically: a folder without it is unfinished.
 /// @throws std::runtime_error naming the file when the disk refuses.
@@ -46,12 +53,13 @@ class Recorder {
   /// Makes what was recorded so far readable by others.
   void flush();
 
-  /// cloud.pcd, replaced atomically. May be called from a job.
-  void write_cloud(const std::vector<Vec3f>& points_O) const;
+  /// cloud.pcd and cloud_growth.csv, each replaced atomically. May be called from a job.
+  void write_cloud(const std::vector<Vec3f>& points_O,
+                   const std::vector<CloudGrowth>& growth) const;
   /// map.bt, map2d.pgm and map2d.yaml.
   void write_maps(const Mapper& mapper) const;
   /// A whole file of the folder, replaced atomically.
-  void write_file(const std::string& name, const std::string& content);
+  void write_file(const std::string& name, const std::string& content) const;
   /// Flushes everything, then writes summary.json.
   void write_summary(const nlohmann::ordered_json& summary);
 

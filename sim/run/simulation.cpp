@@ -14,6 +14,7 @@ constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leave
 constexpr Stamp kPathPeriod = 100 * kTick;      // 10 Hz: revisits and turns
 constexpr Stamp kCoveragePeriod = 1000 * kTick;
 constexpr Stamp kScoreDue = 1000 * kTick;  // the flight does not wait for what is scored or written
+constexpr Stamp kGrowthPeriod = 500 * kTick;  // what a replay of the map resolves
 constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
 constexpr Stamp kLidarPart = 20 * kTick;      // a frame is cast in parts while it is fired
 
@@ -212,6 +213,7 @@ void Simulation::record() {
   if (coverage_ && now_ % kPathPeriod == 0) path_W_.push_back(truth.X_WB.p);
   if (coverage_ && now_ % kCoveragePeriod == 0) score_coverage();
   if (recorder_ && now_ % kFlushPeriod == 0) recorder_->flush();
+  if (recorder_ && now_ % kGrowthPeriod == 0) note_cloud_growth();
   if (recorder_ && now_ > 0 && now_ % kCloudPeriod == 0) write_cloud();
 }
 
@@ -234,7 +236,16 @@ void Simulation::write_cloud() {
   // Behind the insertions of the same lane, so that the file is the map of this moment.
   jobs_.schedule(stack_.perception().cloud_lane(), now_ + kScoreDue,
                  [this]() -> JobQueue::Delivery {
-                   recorder_->write_cloud(stack_.perception().cloud().points());
+                   recorder_->write_cloud(stack_.perception().cloud().points(), cloud_growth_);
+                   return nullptr;
+                 });
+}
+
+void Simulation::note_cloud_growth() {
+  jobs_.schedule(stack_.perception().cloud_lane(), now_ + kScoreDue,
+                 [this, stamp = now_]() -> JobQueue::Delivery {
+                   const std::size_t points = stack_.perception().cloud().size();
+                   if (points > 0) cloud_growth_.push_back({stamp, points});
                    return nullptr;
                  });
 }
@@ -286,7 +297,7 @@ FlightResult Simulation::finish() {
   result.flight = scorer_.score(physics_.truth(), stack_);
   const std::vector<Vec3f> cloud = stack_.perception().cloud().points();
   if (!cloud.empty()) {
-    if (recorder_) recorder_->write_cloud(cloud);
+    if (recorder_) recorder_->write_cloud(cloud, cloud_growth_);
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
     // odometry's.
     result.map =

@@ -82,6 +82,7 @@ class Simulation {
   void judge();
   void end(Outcome outcome, const std::string& reason);
   void write_cloud();
+  void note_cloud_growth();
   void score_coverage();
 
   struct Timers {
@@ -115,6 +116,7 @@ class Simulation {
   std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
   std::vector<Vec3> path_W_;                  ///< flown since the last score
   std::size_t covered_points_ = 0;            ///< of the cloud, already scored
+  std::vector<CloudGrowth> cloud_growth_;     ///< in jobs of the cloud's lane
   double area_fraction_ = 0;
   int collisions_ = 0;
   Timers timers_;

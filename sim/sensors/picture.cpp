@@ -166,6 +166,10 @@ Eigen::Matrix4f clip_from_camera(const PinholeCamera& camera) {
   return m;
 }
 
+float cut_of(const PictureOptions& options) {
+  return options.cut_above_m < kNoCut ? static_cast<float>(options.cut_above_m) : kNoCut;
+}
+
 bool has_ceiling(const worlds::World& world) {
   return std::any_of(world.objects.begin(), world.objects.end(), [](const worlds::Object& o) {
     return o.surface_class == worlds::SurfaceClass::kCeiling;
@@ -187,6 +191,13 @@ struct PictureRenderer::Impl {
     VertexSet world;
     ShadowMap shadow;
     std::optional<float> shadow_cut_above;
+    std::optional<Canvas> world_canvas;  ///< the world alone
+    std::optional<Canvas> frame_canvas;  ///< with the overlay
+    struct View {
+      Pose X_WC;
+      PictureOptions options;
+    };
+    std::optional<View> world_view;  ///< what world_canvas shows
 
     explicit Device(const worlds::World& w)
         : world(picture_vertices(w.mesh, object_colours(w))), shadow(w.bounds) {
@@ -194,6 +205,14 @@ struct PictureRenderer::Impl {
       glPixelStorei(GL_PACK_ALIGNMENT, 1);
       glEnable(GL_CLIP_DISTANCE0);
       draw_shadow(kNoCut);
+    }
+
+    /// A canvas of the camera's size, made anew if it has another.
+    static const Canvas& canvas(std::optional<Canvas>& canvas, const PinholeCamera& camera) {
+      if (!canvas || canvas->width != camera.width || canvas->height != camera.height) {
+        canvas.emplace(camera.width, camera.height);
+      }
+      return *canvas;
     }
 
     /// Redraws the shadow map if what stands in the sun has changed.
@@ -215,6 +234,8 @@ struct PictureRenderer::Impl {
   };
   std::optional<Device> device;
 
+  /// Draws the world into world_canvas unless that shows it already.
+  void draw_world(const Pose& X_WC, const PictureOptions& options, const PinholeCamera& camera);
   void set_view(const gl::Program& program, const Pose& X_WC, const PinholeCamera& camera) const {
     glUseProgram(program.id());
     const Vec3f to_sun = kToSun.cast<float>();
@@ -248,28 +269,27 @@ PictureRenderer::~PictureRenderer() {
   impl_->device.reset();
 }
 
-Picture PictureRenderer::render(const Pose& X_WC, const PictureOptions& options,
-                                const PictureOverlay& overlay) {
-  const PinholeCamera camera = supersampled_camera(options);
-  const auto visible = visible_chunks(impl_->chunks, ViewVolume(camera, X_WC, kFar));
-  const float cut_above =
-      options.cut_above_m < kNoCut ? static_cast<float>(options.cut_above_m) : kNoCut;
-  const bool headlight = options.light == PictureOptions::Light::kSunAndHeadlight ||
-                         (options.light == PictureOptions::Light::kAutomatic && impl_->interior &&
-                          cut_above == kNoCut);
-  std::vector<std::uint8_t> rgba(static_cast<std::size_t>(camera.width) *
-                                 static_cast<std::size_t>(camera.height) * 4);
+void PictureRenderer::Impl::draw_world(const Pose& X_WC, const PictureOptions& options,
+                                       const PinholeCamera& camera) {
+  const bool drawn = device->world_view && device->world_view->options == options &&
+                     device->world_view->X_WC.p == X_WC.p && device->world_view->X_WC.R == X_WC.R;
+  if (drawn) return;
+  device->world_view.reset();
+  const float cut_above = cut_of(options);
+  auto visible = visible_chunks(chunks, ViewVolume(camera, X_WC, kFar));
+  std::erase_if(visible, [&](std::uint32_t i) { return chunks[i].bounds.min().z() > cut_above; });
+  const bool headlight =
+      options.light == PictureOptions::Light::kSunAndHeadlight ||
+      (options.light == PictureOptions::Light::kAutomatic && interior && cut_above == kNoCut);
 
-  const EglContext::Current current(impl_->context);
-  Impl::Device& device = *impl_->device;
-  device.draw_shadow(cut_above);
-  const Canvas canvas(camera.width, camera.height);
+  device->draw_shadow(cut_above);
+  const Canvas& canvas = device->canvas(device->world_canvas, camera);
   glBindFramebuffer(GL_FRAMEBUFFER, canvas.framebuffer.id());
   glViewport(0, 0, canvas.width, canvas.height);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CLIP_DISTANCE0);
-  impl_->set_view(device.sky_program, X_WC, camera);
-  glBindVertexArray(device.nothing.id());
+  set_view(device->sky_program, X_WC, camera);
+  glBindVertexArray(device->nothing.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 
   glEnable(GL_DEPTH_TEST);
@@ -277,16 +297,41 @@ Picture PictureRenderer::render(const Pose& X_WC, const PictureOptions& options,
   glDepthFunc(GL_GREATER);
   glClearDepth(0.0);
   glClear(GL_DEPTH_BUFFER_BIT);
-  const gl::Program& program = device.surface_program;
-  impl_->set_view(program, X_WC, camera);
+  const gl::Program& program = device->surface_program;
+  set_view(program, X_WC, camera);
   glUniform1f(program.uniform("cut_above"), cut_above);
   glUniform1f(program.uniform("visibility"), static_cast<float>(options.visibility_m));
   glUniform1f(program.uniform("headlight"), headlight ? 1.0F : 0.0F);
-  glBindTextureUnit(0, device.shadow.depth.id());
-  device.world.draw(impl_->chunks, visible);
-  glUniform1f(program.uniform("cut_above"), kNoCut);
+  glBindTextureUnit(0, device->shadow.depth.id());
+  device->world.draw(chunks, visible);
+  device->world_view = Impl::Device::View{X_WC, options};
+}
+
+Picture PictureRenderer::render(const Pose& X_WC, const PictureOptions& options,
+                                const PictureOverlay& overlay) {
+  const PinholeCamera camera = supersampled_camera(options);
+  std::vector<std::uint8_t> rgba(static_cast<std::size_t>(camera.width) *
+                                 static_cast<std::size_t>(camera.height) * 4);
   const auto extra = overlay_vertices(overlay);
-  if (!extra.empty()) VertexSet(extra).draw();
+
+  const EglContext::Current current(impl_->context);
+  Impl::Device& device = *impl_->device;
+  impl_->draw_world(X_WC, options, camera);
+  const Canvas& canvas = device.canvas(device.frame_canvas, camera);
+  const auto copy = [&](GLbitfield what) {
+    glBlitNamedFramebuffer(device.world_canvas->framebuffer.id(), canvas.framebuffer.id(), 0, 0,
+                           canvas.width, canvas.height, 0, 0, canvas.width, canvas.height, what,
+                           GL_NEAREST);
+  };
+  copy(GL_COLOR_BUFFER_BIT);
+  copy(GL_DEPTH_BUFFER_BIT);
+  glBindFramebuffer(GL_FRAMEBUFFER, canvas.framebuffer.id());
+  glViewport(0, 0, canvas.width, canvas.height);
+  if (!extra.empty()) {
+    glUseProgram(device.surface_program.id());
+    glUniform1f(device.surface_program.uniform("cut_above"), kNoCut);
+    VertexSet(extra).draw();
+  }
   glReadPixels(0, 0, canvas.width, canvas.height, GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
   return shrink(rgba, options.width, options.height);
 }

@@ -36,6 +36,8 @@ struct PictureOptions {
     kSun,
     kSunAndHeadlight,  ///< the sun where it reaches, and a lamp at the camera
   } light = Light::kAutomatic;
+
+  bool operator==(const PictureOptions&) const = default;
 };
 
 /// Things drawn into the world.
@@ -59,7 +61,8 @@ class PictureRenderer {
   explicit PictureRenderer(const worlds::World& world);
   ~PictureRenderer();
 
-  /// Camera frame C: z forward, x right, y down.
+  /// Camera frame C: z forward, x right, y down. A view that is the same as the one before costs
+  /// its overlay only.
   [[nodiscard]] Picture render(const Pose& X_WC, const PictureOptions& options = {},
                                const PictureOverlay& overlay = {});
 

@@ -2,10 +2,42 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "math/random.h"
+
 namespace arex {
 namespace {
 
 constexpr Stamp kFrame = 100'000'000;
+constexpr int kFirings = 20000;
+
+struct Flaws {
+  double missing = 0.005;  ///< share of the returns lost
+  double spikes = 0;       ///< share at any range
+};
+
+/// A scan in a room with a clutter of poles, `clutter` of the firings on one.
+LidarScan make_scan(Stamp end, const Flaws& flaws, double clutter, RandomStream& random) {
+  LidarScan scan;
+  scan.stamp = end - kFrame;
+  scan.end = end;
+  for (int i = 0; i < kFirings; ++i) {
+    const double angle = 2e-3 * i;
+    double range = 5 / std::max(std::abs(std::cos(angle)), std::abs(std::sin(angle)));
+    if (random.uniform() < clutter) range *= 0.6;
+    if (random.uniform() < flaws.missing) continue;
+    if (random.uniform() < flaws.spikes) range = random.uniform(0.5, 40);
+    LidarPoint point;
+    point.p_L = Vec3(range * std::cos(angle), range * std::sin(angle), 0).cast<float>();
+    point.offset_ns = static_cast<std::uint32_t>(5000 * i);
+    point.line = static_cast<std::uint8_t>(i % 4);
+    scan.points.push_back(point);
+  }
+  return scan;
+}
 
 RegistrationReport matched(int matched, int points) {
   RegistrationReport report;
@@ -14,55 +46,95 @@ RegistrationReport matched(int matched, int points) {
   return report;
 }
 
-/// A watch that has seen two sound seconds, up to `now`.
-LidarWatch after_sound_scans(Stamp& now) {
-  LidarWatch watch{LidarWatchConfig{}};
-  for (int i = 0; i < 20; ++i) {
-    now += kFrame;
-    watch.add_scan(now, 15000);
-    watch.add_registration(matched(1400, 1500));
-    EXPECT_FALSE(watch.update(now));
+/// Flies a watch: what it tells, with the frame at which it does.
+class Watching {
+ public:
+  explicit Watching(std::uint64_t seed) : random_(seed, "watch") {
+    for (int i = 0; i < 25; ++i) frame({}, matched(1400, 1500));
+    EXPECT_EQ(told_, "");
   }
-  return watch;
-}
+  void frame(const Flaws& flaws, const RegistrationReport& report) {
+    now_ += kFrame;
+    const double clutter = 0.04 + 0.02 * std::sin(0.3 * static_cast<double>(frame_));
+    watch_.add_scan(now_, make_scan(now_, flaws, clutter, random_));
+    watch_.add_registration(report);
+    update();
+  }
+  void empty_frame() {  // the device still sends frames, with nothing in them
+    now_ += kFrame;
+    LidarScan scan;
+    scan.stamp = now_ - kFrame;
+    scan.end = now_;
+    watch_.add_scan(now_, scan);
+    update();
+  }
+  /// "frame:what;" for all that was told since the last call.
+  std::string told() { return std::exchange(told_, ""); }
+  void count_from_here() { frame_ = 0; }
+
+ private:
+  void update() {
+    if (const auto fault = watch_.update(now_)) {
+      told_ += std::to_string(frame_) + ":" + std::string(*fault) + ";";
+    }
+    ++frame_;
+  }
+
+  RandomStream random_;
+  LidarWatch watch_{LidarWatchConfig{}};
+  Stamp now_ = 0;
+  int frame_ = 0;
+  std::string told_;
+};
 
 TEST(LidarWatch, SaysOnceThatItIsSilentAndOnceThatItIsBack) {
-  Stamp now = 0;
-  LidarWatch watch = after_sound_scans(now);
-  int told = 0;
-  for (int i = 0; i < 10; ++i) {
-    now += kFrame;
-    watch.add_scan(now, 3);  // the device still sends frames, with nothing in them
-    if (const auto fault = watch.update(now)) {
-      EXPECT_EQ(*fault, "lidar silent");
-      EXPECT_EQ(i, 2);
-      ++told;
-    }
+  Watching w(1);
+  w.count_from_here();
+  for (int i = 0; i < 10; ++i) w.empty_frame();
+  for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
+  EXPECT_EQ(w.told(), "2:lidar silent;12:lidar sound again;");
+}
+
+TEST(LidarWatch, NoticesAFifthOfTheReturnsMissing) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Watching w(seed);
+    w.count_from_here();
+    for (int i = 0; i < 10; ++i) w.frame({.missing = 0.2}, matched(1400, 1500));
+    for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
+    EXPECT_EQ(w.told(), "0:lidar returns missing;12:lidar sound again;");
   }
-  EXPECT_EQ(told, 1);
-  now += kFrame;
-  watch.add_scan(now, 15000);
-  EXPECT_EQ(watch.update(now), "lidar sound again");
-  EXPECT_FALSE(watch.update(now));
+}
+
+TEST(LidarWatch, NoticesATenthOfTheReturnsFalse) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Watching w(seed);
+    w.count_from_here();
+    for (int i = 0; i < 50; ++i) w.frame({.spikes = 0.1}, matched(1300, 1500));  // not got used to
+    for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
+    EXPECT_EQ(w.told(), "0:lidar returns false;52:lidar sound again;");
+  }
 }
 
 TEST(LidarWatch, NoticesReturnsThatFitNothing) {
-  Stamp now = 0;
-  LidarWatch watch = after_sound_scans(now);
-  for (int i = 0; i < 50; ++i) {  // and does not get used to them
-    now += kFrame;
-    watch.add_scan(now, 15000);
-    watch.add_registration(matched(1400, 3500));
-    const auto fault = watch.update(now);
-    if (i == 0) {
-      EXPECT_EQ(fault, "lidar returns refused");
-    } else {
-      EXPECT_FALSE(fault);
-    }
-  }
-  watch.add_scan(now, 15000);
-  watch.add_registration(matched(1300, 1500));
-  EXPECT_EQ(watch.update(now), "lidar sound again");
+  Watching w(1);
+  w.count_from_here();
+  for (int i = 0; i < 50; ++i) w.frame({}, matched(1400, 3500));
+  w.frame({}, matched(1300, 1500));
+  for (int i = 0; i < 10; ++i) w.frame({}, matched(1300, 1500));
+  EXPECT_EQ(w.told(), "0:lidar returns false;53:lidar sound again;");
+}
+
+// The survey's counts are binomial: shares of the flaws, of firings whose neighbours are sound.
+TEST(LidarWatch, SurveyCountsWhatIsMissingAndWhatIsElsewhere) {
+  RandomStream random(3, "survey");
+  const LidarWatch watch{LidarWatchConfig{}};
+  const auto clean = watch.survey(make_scan(kFrame, {.missing = 0}, 0, random));
+  EXPECT_GT(clean.between, kFirings - 1000);  // but for the corners
+  EXPECT_EQ(clean.missing + clean.spikes, 0);
+  const auto flawed = watch.survey(make_scan(kFrame, {.missing = 0.2, .spikes = 0.1}, 0, random));
+  const double n = flawed.between;
+  EXPECT_NEAR(flawed.missing / n, 0.2, 4 * std::sqrt(0.16 / n));
+  EXPECT_NEAR(flawed.spikes / n, 0.08, 0.01 + 4 * std::sqrt(0.08 / n));  // some hit the wall
 }
 
 TEST(LidarWatch, WaitsForTheFirstScan) {

@@ -172,5 +172,40 @@ TEST(CommandLine, AKilledRunLeavesNothingThatLooksFinished) {
   EXPECT_NE(read_text(folder / "run/events.csv").find("mission_state"), std::string::npos);
 }
 
+TEST(CommandLine, ReportNamesAFolderWithoutARun) {
+  const TemporaryFolder folder;
+  const std::string name = folder.path().string();
+  for (const std::string& bad : {name, name + "/nowhere"}) {
+    const Result result = run({"report", bad});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_EQ(result.err, bad + ":1: expected a run folder or the folder of a sweep\n");
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(CommandLine, ReportsUnfinishedRunsAndComparesSeveral) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) {
+    std::filesystem::create_directory(folder / name);
+    write_text(folder / name / "resolved.yaml", "seed: 1\n");
+  }
+  const std::string a = (folder / "a").string(), b = (folder / "b").string();
+  EXPECT_EQ(run({"report", a}).out, a + "/report.html (unfinished run)\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "report.html"));
+  EXPECT_EQ(run({"report", a, b}).exit_code, 0);
+  EXPECT_NE(read_text(folder / "report.html").find("href=\"./a/report.html\""), std::string::npos);
+}
+
+TEST(CommandLine, RenderRefusesWhatItCannotDraw) {
+  const TemporaryFolder folder;
+  const std::string name = folder.path().string();
+  EXPECT_EQ(run({"render", name, "--out", name + "/x.gif"}).err,
+            "--out " + name + "/x.gif: expected FILE.png or FILE.mp4\n");
+  const Result result = run({"render", name, "--out", name + "/x.mp4"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.err, name + "/truth.tum:1: holds no pose, expected a flown run\n");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
 }  // namespace
 }  // namespace arex

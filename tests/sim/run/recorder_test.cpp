@@ -56,6 +56,17 @@ TEST(Recorder, QuotesDetailsWithCommas) {
             "time_s,kind,detail\n1.500,stuck,\"a, \"\"b\"\"\"\n");
 }
 
+TEST(Recorder, TellsWhenTheCloudGrew) {
+  const TemporaryFolder folder;
+  Recorder recorder(folder / "run", "");
+  recorder.write_cloud({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}, {{500'000'000, 1}, {2'000'000'000, 3}});
+  EXPECT_EQ(read_text(folder / "run/cloud_growth.csv"), "time_s,points\n0.500,1\n2.000,3\n");
+  EXPECT_TRUE(std::filesystem::exists(folder / "run/cloud.pcd"));
+  // A new run in the same folder does not inherit it.
+  { const Recorder next(folder / "run", ""); }
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/cloud_growth.csv"));
+}
+
 TEST(Recorder, SaysWhichFileCannotBeWritten) {
   const TemporaryFolder folder;
   test::write_text(folder / "file", "not a folder");

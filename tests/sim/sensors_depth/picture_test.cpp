@@ -44,7 +44,8 @@ TEST(Picture, ShowsSkyAboveGroundBelowAndThePathWhereItRuns) {
   terrain.columns = terrain.rows = 41;
   terrain.height_m.assign(41 * 41, 0.0F);
   builder.add_height_field(ground, terrain);
-  PictureRenderer renderer(builder.finish());
+  const worlds::World world = builder.finish();
+  PictureRenderer renderer(world);
   const Pose X_WC = look_at({-5, 0, 1}, {0, 0, 1});
   const Picture bare = renderer.render(X_WC, small_picture());
   const auto [sky_r, sky_g, sky_b] = pixel(bare, 80, 10);
@@ -61,6 +62,12 @@ TEST(Picture, ShowsSkyAboveGroundBelowAndThePathWhereItRuns) {
   EXPECT_GT(r, 2 * b);
   EXPECT_EQ(pixel(bare, 80, 10), pixel(drawn, 80, 10));
   EXPECT_EQ(renderer.render(X_WC, small_picture()).rgb, bare.rgb);
+  // The world of a view that stands still is drawn once; nobody sees that.
+  EXPECT_EQ(PictureRenderer(world).render(X_WC, small_picture(), overlay).rgb, drawn.rgb);
+  PictureOverlay buried;
+  buried.paths.push_back({{Vec3(0, -1, -1), Vec3(0, 1, -1)}, Vec3(0.9, 0.0, 0.0), 0.2});
+  EXPECT_EQ(renderer.render(X_WC, small_picture(), buried).rgb, bare.rgb);
+  EXPECT_NE(renderer.render(look_at({-5, 0, 2}, {0, 0, 1}), small_picture()).rgb, bare.rgb);
 }
 
 TEST(Picture, LooksUnderACeilingThatIsCutAway) {

@@ -1,0 +1,286 @@
+// A sweep, or runs side by side: curves, heat map, two configurations, the table.
+
+import { addChart, clearCharts } from './charts';
+import { byId, element, onThemeChange, shown, themeColour } from './dom';
+import { Cell, SweepPayload } from './payload';
+import { Results, SUCCESS, betterSign, shortKey } from './results';
+import { Estimate, estimateMean } from './statistics';
+
+const LINE_COLOURS = 6; // --line-1 ... of the style sheet
+
+function choice(label: string, id: string, options: string[], chosen: string, change: (value: string) => void): HTMLLabelElement {
+  const select = element('select', { id, change: () => change(select.value) });
+  for (const option of options) select.append(element('option', { value: option, selected: option === chosen }, option));
+  return element('label', {}, label, select);
+}
+
+function interval(estimate: Estimate): string {
+  if (estimate.n === 0) return '–';
+  if (!Number.isFinite(estimate.low)) return shown(estimate.mean, 3);
+  return `${shown(estimate.mean, 3)} (${shown(estimate.low, 3)} … ${shown(estimate.high, 3)})`;
+}
+
+/** Blends two colours of the style sheet. */
+function blend(from: string, to: string, share: number): string {
+  return `color-mix(in oklab, ${themeColour(to)} ${(100 * share).toFixed(1)}%, ${themeColour(from)})`;
+}
+
+/** What is drawn: a figure over one key, and over a second one. */
+class FigureView {
+  private figure: string;
+  private across: string;
+  private by: string;
+  private charts = element('div');
+  private heat = element('div', { class: 'heat-box' });
+
+  constructor(private results: Results, section: HTMLElement) {
+    const usual = ['coverage.t95_s', 'coverage.area_fraction', 'sim_time_s', SUCCESS];
+    const varying = usual.find((name) => results.figures.includes(name) && this.varies(name));
+    this.figure = varying ?? results.figures[0];
+    this.across = results.factors[0];
+    this.by = results.factors[1] ?? '';
+    const { factors, figures } = results;
+    const set = (apply: (value: string) => void) => (value: string) => {
+      apply(value);
+      this.draw();
+    };
+    const controls = element('div', { class: 'controls' });
+    controls.append(choice('figure', 'figure', figures, this.figure, set((v) => (this.figure = v))));
+    if (factors.length > 1) {
+      controls.append(choice('across', 'across', factors, this.across, set((v) => (this.across = v))));
+      controls.append(choice('by', 'by', ['', ...factors], this.by, set((v) => (this.by = v))));
+    }
+    section.append(element('h2', {}, 'Effect of what was varied'), controls,
+      element('div', { class: 'columns' }, this.charts, this.heat));
+    section.append(element('p', { class: 'note' },
+      'Means over seeds and over every key not chosen, with 95 % confidence intervals (Student; Wilson for ' +
+      'shares). Runs without the figure are left out; n says how many had it.'));
+    if (results.ranged.length > 0) {
+      const text = `Of ${results.ranged.join(', ')} each value stands for the range around it.`;
+      section.append(element('p', { class: 'note' }, text));
+    }
+    onThemeChange(() => this.drawHeat());
+    this.draw();
+  }
+
+  private varies(figure: string): boolean {
+    const values = this.results.payload.rows.map((_row, i) => this.results.value(i, figure)).filter((v) => v !== null);
+    return values.length > 1 && new Set(values).size > 1;
+  }
+
+  private draw(): void {
+    this.drawCurves();
+    this.drawHeat();
+  }
+
+  private drawCurves(): void {
+    clearCharts();
+    this.charts.replaceChildren();
+    const { results, across, by, figure } = this;
+    const levels = results.levels(across);
+    const numeric = levels.every((level) => typeof level === 'number');
+    const x = numeric ? (levels as number[]) : levels.map((_level, i) => i);
+    const groups: (Cell | undefined)[] = by && by !== across ? results.levels(by) : [undefined];
+    const lines = [];
+    const bands = [];
+    for (const [g, group] of groups.slice(0, LINE_COLOURS).entries()) {
+      const estimates = levels.map((level) => {
+        const values: Record<string, Cell> = { [across]: level };
+        if (group !== undefined) values[by] = group;
+        return results.estimate(results.where(values), figure);
+      });
+      const colour = `--line-${g + 1}`;
+      const name = group === undefined ? 'mean' : `${shortKey(by)} ${group ?? '–'}`;
+      const first = lines.length;
+      lines.push({ label: name, values: estimates.map((e) => e.mean), colour, unit: '' });
+      lines.push({ label: 'low', values: estimates.map((e) => e.low), colour, unit: '', edge: true });
+      lines.push({ label: 'high', values: estimates.map((e) => e.high), colour, unit: '', edge: true });
+      bands.push({ low: first + 1, high: first + 2, colour });
+    }
+    if (groups.length > LINE_COLOURS) {
+      const text = `The first ${LINE_COLOURS} of ${groups.length} values of ${by} are drawn; the heat map has all.`;
+      this.charts.append(element('p', { class: 'note' }, text));
+    }
+    addChart(this.charts, {
+      title: `${figure} over ${across}`,
+      xLabel: across,
+      x,
+      lines,
+      bands,
+      points: true,
+      zero: false,
+      height: 300,
+      names: numeric ? undefined : levels.map(String),
+    });
+  }
+
+  private drawHeat(): void {
+    this.heat.replaceChildren();
+    const { results, across, by, figure } = this;
+    this.heat.hidden = !by || by === across;
+    if (this.heat.hidden) return;
+    const columns = results.levels(across);
+    const rows = results.levels(by);
+    const cells = rows.map((row) =>
+      columns.map((column) => results.estimate(results.where({ [across]: column, [by]: row }), figure)),
+    );
+    const means = cells.flat().filter((e) => e.n > 0).map((e) => e.mean);
+    const low = Math.min(...means);
+    const high = Math.max(...means);
+    const table = element('table', { class: 'heat' });
+    const head = element('tr', {}, element('th', {}, `${shortKey(by)} \\ ${shortKey(across)}`));
+    for (const column of columns) head.append(element('th', {}, String(column ?? '–')));
+    table.append(element('thead', {}, head));
+    const body = element('tbody');
+    rows.forEach((row, r) => {
+      const line = element('tr', {}, element('th', {}, String(row ?? '–')));
+      for (const estimate of cells[r]) line.append(heatCell(estimate, low, high));
+      body.append(line);
+    });
+    table.append(body);
+    this.heat.append(element('h3', {}, `${figure}, mean`), table);
+  }
+}
+
+function heatCell(estimate: Estimate, low: number, high: number): HTMLElement {
+  if (estimate.n === 0) return element('td', {}, '–');
+  const known = Number.isFinite(estimate.low) ? `${shown(estimate.low, 3)} … ${shown(estimate.high, 3)}, ` : '';
+  const small = `${known}n ${estimate.n}`;
+  const cell = element('td', {}, shown(estimate.mean, 3), element('small', {}, small));
+  const share = high > low ? (estimate.mean - low) / (high - low) : 0.5;
+  cell.style.background = blend('--heat-low', '--heat-high', share);
+  cell.style.color = themeColour(share > 0.55 ? '--heat-text-high' : '--heat-text-low');
+  return cell;
+}
+
+/** Two configurations, figure by figure, paired by what they share. */
+function sideBySide(results: Results, section: HTMLElement): void {
+  const configurations = results.configurations();
+  if (configurations.length < 2) return;
+  const names = configurations.map((c) => c.name);
+  const chosen = [names[0], names[names.length - 1]];
+  const box = element('div', { class: 'scroll' });
+  const draw = () => {
+    const [a, b] = chosen.map((name) => results.where(configurations[names.indexOf(name)].values));
+    const body = element('tbody');
+    for (const figure of results.figures) {
+      const row = comparisonRow(results, figure, a, b);
+      if (row) body.append(row);
+    }
+    const head = element('tr', {}, element('th', { class: 'word' }, 'figure'), element('th', {}, 'A'), element('th', {}, 'B'),
+      element('th', {}, 'B − A, paired'));
+    box.replaceChildren(element('table', { class: 'data' }, element('thead', {}, head), body));
+  };
+  section.append(
+    element('h2', {}, 'Side by side'),
+    element('div', { class: 'controls' },
+      choice('A', 'side-a', names, chosen[0], (name) => ((chosen[0] = name), draw())),
+      choice('B', 'side-b', names, chosen[1], (name) => ((chosen[1] = name), draw()))),
+    box,
+    element('p', { class: 'note' },
+      'Mean (95 % confidence interval). Differences are taken seed by seed where both flew it; one whose ' +
+      'interval leaves zero out is marked. Among many figures, one in twenty does so by chance.'),
+  );
+  draw();
+}
+
+function comparisonRow(results: Results, figure: string, a: number[], b: number[]): HTMLElement | null {
+  const [of_a, of_b] = [results.estimate(a, figure), results.estimate(b, figure)];
+  if (of_a.n === 0 && of_b.n === 0) return null;
+  const identity = (row: number) => `${results.cell(row, 'seed')} ${results.cell(row, 'repeat')}`;
+  const partners = new Map(a.map((row) => [identity(row), results.value(row, figure)]));
+  const differences = b.flatMap((row) => {
+    const [before, after] = [partners.get(identity(row)), results.value(row, figure)];
+    return before === null || before === undefined || after === null ? [] : [after - before];
+  });
+  const difference = estimateMean(differences);
+  const significant = difference.low > 0 || difference.high < 0;
+  const better = Math.sign(difference.mean) * betterSign(figure);
+  const mark = !significant ? '' : better > 0 ? 'better' : better < 0 ? 'worse' : 'differs';
+  const text = differences.length === 0 ? '–' : `${interval(difference)}, n ${difference.n}${mark ? ', ' + mark : ''}`;
+  return element('tr', {}, element('td', { class: 'word' }, figure), element('td', {}, interval(of_a)),
+    element('td', {}, interval(of_b)), element('td', { class: mark }, text));
+}
+
+/** Columns that the table shows at first. */
+const TABLE_FIGURES = [
+  'sim_time_s', 'distance_m', 'coverage.area_fraction', 'coverage.t95_s', 'odometry.ate_rmse_m', 'clearance.min_m',
+  'collisions', 'battery.used_wh',
+];
+
+class RunTable {
+  private all = false;
+  private sortedBy = '';
+  private direction = 1;
+  private box = element('div', { class: 'scroll' });
+
+  constructor(private results: Results, section: HTMLElement) {
+    const whole = element('input', {
+      type: 'checkbox', id: 'all-columns',
+      change: () => {
+        this.all = whole.checked;
+        this.draw();
+      },
+    });
+    section.append(element('h2', {}, 'Runs'), element('div', { class: 'controls' }, element('label', {}, whole, 'every column')), this.box);
+    this.draw();
+  }
+
+  private columns(): string[] {
+    const { columns, keys } = this.results.payload;
+    if (this.all) return columns;
+    return [...keys, 'seed', 'failure', 'outcome', ...TABLE_FIGURES].filter((name) => columns.includes(name));
+  }
+
+  private order(): number[] {
+    const rows = this.results.payload.rows.map((_row, i) => i);
+    if (!this.sortedBy) return rows;
+    const value = (row: number) => this.results.cell(row, this.sortedBy);
+    return rows.sort((a, b) => {
+      const [x, y] = [value(a), value(b)];
+      if (x === null || y === null) return Number(x === null) - Number(y === null); // the empty ones last
+      const order = typeof x === 'number' && typeof y === 'number' ? x - y : String(x).localeCompare(String(y));
+      return this.direction * order;
+    });
+  }
+
+  private header(name: string): HTMLElement {
+    const button = element('button', {
+      type: 'button',
+      click: () => {
+        this.direction = this.sortedBy === name ? -this.direction : 1;
+        this.sortedBy = name;
+        this.draw();
+      },
+    }, shortKey(name));
+    const words = this.results.payload.rows.some((_row, i) => typeof this.results.cell(i, name) === 'string');
+    const cell = element('th', { title: name, class: words ? 'word' : '' }, button);
+    if (this.sortedBy === name) cell.setAttribute('aria-sort', this.direction > 0 ? 'ascending' : 'descending');
+    return cell;
+  }
+
+  private draw(): void {
+    const columns = this.columns();
+    const { runs, links } = this.results.payload;
+    const body = element('tbody');
+    for (const row of this.order()) {
+      const link = links[row] ? element('a', { href: links[row] }, runs[row]) : runs[row];
+      const line = element('tr', {}, element('td', { class: 'word' }, link));
+      for (const name of columns) {
+        const cell = this.results.cell(row, name);
+        line.append(typeof cell === 'number' ? element('td', {}, shown(cell)) : element('td', { class: 'word' }, cell ?? ''));
+      }
+      body.append(line);
+    }
+    const head = element('tr', {}, element('th', { class: 'word' }, 'run'), ...columns.map((name) => this.header(name)));
+    this.box.replaceChildren(element('table', { class: 'data', id: 'run-table' }, element('thead', {}, head), body));
+  }
+}
+
+export function showSweep(payload: SweepPayload): void {
+  const results = new Results(payload);
+  if (payload.rows.length === 0) return;
+  if (results.factors.length > 0) new FigureView(results, byId('figures'));
+  sideBySide(results, byId('side'));
+  new RunTable(results, byId('runs'));
+}

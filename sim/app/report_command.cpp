@@ -1,0 +1,91 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "app/commands.h"
+#include "config/config.h"
+#include "report/comparison_report.h"
+#include "report/page.h"
+#include "report/run_report.h"
+
+namespace arex::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+void report_run(const fs::path& folder) {
+  const sim::RunRecord run = sim::read_run(folder, sim::kMaxReportPoints);
+  const fs::path file = folder / "report.html";
+  sim::write_page(file, sim::run_report_html(run));
+  std::printf("%s%s\n", file.c_str(), run.summary ? "" : " (unfinished run)");
+}
+
+void report_comparison(const std::vector<fs::path>& folders, const fs::path& directory,
+                       const std::string& title, bool with_runs) {
+  const sim::ResultTable results = sim::read_results(folders);
+  if (with_runs) {
+    for (const fs::path& run : results.folders) {
+      if (sim::is_run_folder(run)) report_run(run);
+    }
+  }
+  const fs::path file = directory / "report.html";
+  sim::write_page(file, sim::comparison_report_html(results, title, directory));
+  std::printf("%s (%zu runs)\n", file.c_str(), results.folders.size());
+}
+
+// By what sweep.json calls it, otherwise by its folder.
+std::string sweep_title(const fs::path& folder) {
+  const auto bytes = sim::read_bytes(folder / "sweep.json");
+  const auto json = nlohmann::json::parse(bytes.value_or(""), nullptr, false);
+  if (!json.is_object()) return "Sweep " + folder.filename().string();
+  return "Sweep " + json.value("name", folder.filename().string());
+}
+
+// The deepest folder that holds all of them.
+fs::path common_parent(const std::vector<fs::path>& folders) {
+  fs::path common = folders.front().parent_path();
+  for (const fs::path& folder : folders) {
+    const fs::path parent = folder.parent_path();
+    fs::path shared;
+    auto a = common.begin();
+    for (auto b = parent.begin(); a != common.end() && b != parent.end() && *a == *b; ++a, ++b) {
+      shared /= *a;
+    }
+    common = shared;
+  }
+  return common;
+}
+
+}  // namespace
+
+int report(const ReportArguments& arguments) {
+  std::vector<fs::path> folders;
+  for (const std::string& name : arguments.folders) {
+    std::error_code error;
+    const fs::path folder = fs::canonical(name, error);
+    if (error || !(sim::is_run_folder(folder) || sim::is_sweep_folder(folder))) {
+      throw ConfigError(name + ":1: expected a run folder or the folder of a sweep");
+    }
+    folders.push_back(folder);
+  }
+  for (const fs::path& folder : folders) {
+    if (sim::is_sweep_folder(folder)) {
+      report_comparison({folder}, folder, sweep_title(folder), arguments.runs);
+    } else {
+      report_run(folder);
+    }
+  }
+  if (folders.size() > 1) {
+    const fs::path directory = common_parent(folders);
+    if (sim::is_run_folder(directory) || sim::is_sweep_folder(directory)) {
+      throw ConfigError(directory.string() +
+                        ":1: has a report of its own, expected folders side by side");
+    }
+    report_comparison(folders, directory, std::to_string(folders.size()) + " folders compared",
+                      false);
+  }
+  return 0;
+}
+
+}  // namespace arex::app

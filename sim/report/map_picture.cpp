@@ -1,0 +1,231 @@
+#include "report/map_picture.h"
+
+#include <png.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+#include "report/payload.h"
+#include "report/targets.h"
+
+namespace arex::sim {
+namespace {
+
+constexpr double kCloudCell = 0.2;      // m, of the stand-in for a 2D map
+constexpr std::size_t kMaxPath = 3000;  // corners of a drawn path
+
+/// A picture of few colours and its place in O.
+struct Backdrop {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> indices;  ///< rows from the top
+  double x_m = 0;                     ///< left edge
+  double y_m = 0;                     ///< top edge
+  double cell_m = 0;
+};
+
+// Red, green, blue, opacity. Greys of middling lightness, so that light and dark pages both carry
+// them.
+constexpr std::array<std::array<std::uint8_t, 4>, 4> kPalette = {
+    {{0, 0, 0, 0}, {128, 140, 160, 46}, {110, 122, 140, 150}, {92, 104, 124, 255}}};
+constexpr std::uint8_t kUnknown = 0, kFree = 1, kSparse = 2, kOccupied = 3;
+
+std::string png_data_uri(const Backdrop& backdrop) {
+  png_image image;
+  std::memset(&image, 0, sizeof(image));
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(backdrop.width);
+  image.height = static_cast<png_uint_32>(backdrop.height);
+  image.format = PNG_FORMAT_RGBA_COLORMAP;
+  image.colormap_entries = kPalette.size();
+  png_alloc_size_t size = 0;
+  const auto write = [&](void* memory) {
+    if (png_image_write_to_memory(&image, memory, &size, 0, backdrop.indices.data(), 0,
+                                  kPalette.data()) == 0) {
+      throw std::runtime_error(std::string("PNG of the 2D map: ") + image.message);
+    }
+  };
+  write(nullptr);
+  std::vector<std::uint8_t> bytes(size);
+  write(bytes.data());
+  bytes.resize(size);
+  return "data:image/png;base64," + base64(bytes);
+}
+
+// The known part of the map.
+Backdrop backdrop_of(const RecordedMap& map) {
+  const auto at = [&](int x, int y) {
+    return map.cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) +
+                     static_cast<std::size_t>(x)];
+  };
+  int x0 = map.width, x1 = -1, y0 = map.height, y1 = -1;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      if (at(x, y) == 205) continue;
+      x0 = std::min(x0, x);
+      x1 = std::max(x1, x);
+      y0 = std::min(y0, y);
+      y1 = std::max(y1, y);
+    }
+  }
+  if (x1 < 0) return {};
+  Backdrop backdrop;
+  backdrop.width = x1 - x0 + 1;
+  backdrop.height = y1 - y0 + 1;
+  backdrop.cell_m = map.resolution_m;
+  backdrop.x_m = map.origin_x_m + x0 * map.resolution_m;
+  backdrop.y_m = map.origin_y_m + (map.height - y0) * map.resolution_m;
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      const std::uint8_t cell = at(x, y);
+      backdrop.indices.push_back(cell < 100 ? kOccupied : cell > 230 ? kFree : kUnknown);
+    }
+  }
+  return backdrop;
+}
+
+Backdrop backdrop_of(const std::vector<Vec3f>& points_O) {
+  if (points_O.empty()) return {};
+  Eigen::AlignedBox2f box;
+  for (const Vec3f& p : points_O) {
+    if (p.allFinite()) box.extend(p.head<2>());
+  }
+  Backdrop backdrop;
+  backdrop.cell_m = kCloudCell;
+  backdrop.x_m = box.min().x();
+  backdrop.y_m = box.max().y();
+  backdrop.width = 1 + static_cast<int>(box.sizes().x() / kCloudCell);
+  backdrop.height = 1 + static_cast<int>(box.sizes().y() / kCloudCell);
+  if (backdrop.width > 4000 || backdrop.height > 4000) return {};
+  std::vector<int> counts(static_cast<std::size_t>(backdrop.width) *
+                          static_cast<std::size_t>(backdrop.height));
+  for (const Vec3f& p : points_O) {
+    if (!p.allFinite()) continue;
+    const auto x = static_cast<std::size_t>((p.x() - box.min().x()) / kCloudCell);
+    const auto y = static_cast<std::size_t>((box.max().y() - p.y()) / kCloudCell);
+    ++counts[y * static_cast<std::size_t>(backdrop.width) + x];
+  }
+  for (const int count : counts) {
+    backdrop.indices.push_back(count == 0  ? kUnknown
+                               : count < 3 ? kFree
+                               : count < 8 ? kSparse
+                                           : kOccupied);
+  }
+  return backdrop;
+}
+
+template <typename... Numbers>
+std::string format(const char* pattern, Numbers... numbers) {
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(), pattern, numbers...);
+  return text.data();
+}
+
+std::string polyline(const std::vector<StampedPose>& poses, const char* name) {
+  if (poses.empty()) return {};
+  std::string points;
+  const std::size_t step = poses.size() / kMaxPath + 1;
+  for (std::size_t i = 0; i < poses.size(); i += step) {
+    points += format("%.2f,%.2f ", poses[i].X_OB.p.x(), -poses[i].X_OB.p.y());
+  }
+  points += format("%.2f,%.2f", poses.back().X_OB.p.x(), -poses.back().X_OB.p.y());
+  return "<polyline class=\"" + std::string(name) + "\" points=\"" + points + "\"/>\n";
+}
+
+std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
+  return format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius, name) +
+         "<title>" + escape_html(title) + "</title></circle>\n";
+}
+
+// Kept candidates of every decision as small dots.
+std::string candidates_svg(const Table& decisions, double radius) {
+  const auto x = decisions.numbers("x_m");
+  const auto y = decisions.numbers("y_m");
+  std::string path;
+  constexpr std::size_t kMaxDots = 4000;
+  const std::size_t step = x.size() / kMaxDots + 1;
+  for (std::size_t i = 0; i < std::min(x.size(), y.size()); i += step) {
+    if (!std::isfinite(x[i]) || !std::isfinite(y[i]) || decisions.text(i, "verdict") != "kept") {
+      continue;
+    }
+    path += format("M%.1f %.1fh0", x[i], -y[i]);
+  }
+  if (path.empty()) return {};
+  return format("<path class=\"candidates\" stroke-width=\"%.2f\" d=\"", 1.2 * radius) + path +
+         "\"/>\n";
+}
+
+// A bar of a round length in the lower left corner.
+std::string scale_bar(const Eigen::AlignedBox2d& box, double unit) {
+  const double width = box.sizes().x();
+  double length = 1;
+  for (const double candidate : {2., 5., 10., 20., 50., 100., 200., 500.}) {
+    if (candidate < 0.3 * width) length = candidate;
+  }
+  const double x = box.min().x() + 1.5 * unit;
+  const double y = -box.min().y() - 1.5 * unit;
+  return format("<path class=\"scale\" d=\"M%.2f %.2fv%.2fh%.2fv%.2f\"/>", x, y - 0.6 * unit,
+                0.6 * unit, length, -0.6 * unit) +
+         format("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\">%g m</text>\n", x + 0.4 * unit,
+                y - 0.5 * unit, 1.6 * unit, length);
+}
+
+}  // namespace
+
+std::string map_picture_svg(const RunRecord& run) {
+  if (run.truth.empty() && run.estimate.empty()) return {};
+  const Backdrop backdrop = run.map ? backdrop_of(*run.map) : backdrop_of(run.cloud.points_O);
+  const std::vector<RunTarget> targets = run_targets(run.events);
+
+  Eigen::AlignedBox2d box;
+  for (const auto* poses : {&run.truth, &run.estimate}) {
+    for (const StampedPose& pose : *poses) box.extend(pose.X_OB.p.head<2>());
+  }
+  for (const RunTarget& target : targets) box.extend(target.p_O.head<2>());
+  if (backdrop.width > 0) {
+    box.extend(Vec2(backdrop.x_m, backdrop.y_m));
+    box.extend(Vec2(backdrop.x_m + backdrop.width * backdrop.cell_m,
+                    backdrop.y_m - backdrop.height * backdrop.cell_m));
+  }
+  const double unit = std::max(5.0, box.sizes().maxCoeff()) / 80;  // what a mark measures
+  box.extend(Vec2(box.min() - Vec2::Constant(unit)));
+  box.extend(Vec2(box.max() + Vec2::Constant(unit)));
+
+  std::string svg = format(
+      "<svg id=\"path-map\" role=\"img\" aria-label=\"Flown path over the 2D map\" "
+      "viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\">\n",
+      box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), unit);
+  if (backdrop.width > 0) {
+    svg += format(
+               "<image x=\"%.3f\" y=\"%.3f\" width=\"%.3f\" height=\"%.3f\" "
+               "preserveAspectRatio=\"none\" href=\"",
+               backdrop.x_m, -backdrop.y_m, backdrop.width * backdrop.cell_m,
+               backdrop.height * backdrop.cell_m) +
+           png_data_uri(backdrop) + "\"/>\n";
+  }
+  svg += candidates_svg(run.decisions, 0.5 * unit);
+  svg += polyline(run.truth, "truth");
+  svg += polyline(run.estimate, "estimate");
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const RunTarget& target = targets[i];
+    svg +=
+        circle(target.p_O.x(), target.p_O.y(), 0.55 * unit, target.reached ? "reached" : "target",
+               "target " + std::to_string(i + 1) + ", selected at " +
+                   format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
+  }
+  if (!run.truth.empty()) {
+    const Vec3& start = run.truth.front().X_OB.p;
+    const Vec3& end = run.truth.back().X_OB.p;
+    svg += circle(start.x(), start.y(), 0.9 * unit, "start", "start");
+    svg += format("<path class=\"end\" d=\"M%.2f %.2fl%.2f %.2fm0 %.2fl%.2f %.2f\">",
+                  end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit, -1.6 * unit,
+                  -1.6 * unit, 1.6 * unit) +
+           "<title>end</title></path>\n";
+  }
+  return svg + scale_bar(box, unit) + "</svg>\n";
+}
+
+}  // namespace arex::sim

@@ -1,0 +1,56 @@
+#include "report/page.h"
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "report/payload.h"
+#include "report/viewer.h"
+
+namespace arex::sim {
+
+std::string report_page(const std::string& title, const std::string& main,
+                        const nlohmann::ordered_json& payload) {
+  std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
+  html += "<title>" + escape_html(title) + "</title>\n";
+  html += "<link rel=\"icon\" href=\"data:,\">\n";  // or a browser asks for one
+  html.append("<style>\n").append(viewer_style()).append("</style>\n</head>\n<body>\n<main>\n");
+  html += main;
+  html += "</main>\n<script type=\"application/json\" id=\"data\">";
+  html += json_for_script(payload);
+  html += "</script>\n<script>\n";
+  html.append(viewer_script()).append("</script>\n</body>\n</html>\n");
+  return html;
+}
+
+std::string key_figures_html(const std::vector<KeyFigure>& figures) {
+  std::string html = "<dl class=\"figures\">\n";
+  for (const KeyFigure& figure : figures) {
+    html += "<div><dt>" + escape_html(figure.label) + "</dt><dd>" + escape_html(figure.value);
+    if (!figure.note.empty()) html += "<small>" + escape_html(figure.note) + "</small>";
+    html += "</dd></div>\n";
+  }
+  return html + "</dl>\n";
+}
+
+std::string number_text(double value, int digits) {
+  std::array<char, 48> text{};
+  std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+  return text.data();
+}
+
+void write_page(const std::filesystem::path& file, const std::string& html) {
+  const std::filesystem::path part = file.string() + ".partial";
+  {
+    std::ofstream stream(part, std::ios::binary);
+    stream << html;
+    stream.close();
+    if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+  }
+  std::filesystem::rename(part, file);
+}
+
+}  // namespace arex::sim

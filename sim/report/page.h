@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace arex::sim {
+
+/// A page that needs nothing but itself: the viewer's style and script and the data are inside.
+/// @param main HTML of the page's body, escaped already.
+std::string report_page(const std::string& title, const std::string& main,
+                        const nlohmann::ordered_json& payload);
+
+/// One figure of the summary at the top.
+struct KeyFigure {
+  std::string label;
+  std::string value;
+  std::string note;  ///< may be empty
+};
+std::string key_figures_html(const std::vector<KeyFigure>& figures);
+
+/// Shortest text of a number with so many significant digits.
+std::string number_text(double value, int digits = 3);
+
+/// Replaces the file atomically. @throws std::runtime_error naming it when the disk refuses.
+void write_page(const std::filesystem::path& file, const std::string& html);
+
+}  // namespace arex::sim

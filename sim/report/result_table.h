@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "report/table.h"
+
+namespace arex::sim {
+
+/// Many runs, a row each, whatever they come from.
+struct ResultTable {
+  std::vector<std::string> keys;  ///< what varies beside the seed, in the table's columns
+  /// Columns: keys, `seed`, `failure`, `detail`, then the flattened summaries. A run without a
+  /// summary has a failure and empty figures.
+  Table table;
+  std::vector<std::filesystem::path> folders;  ///< of each row
+};
+
+/// Whether a folder holds a sweep, finished or not.
+bool is_sweep_folder(const std::filesystem::path& folder);
+
+/// Reads the sweep.csv of sweeps and the summaries of single runs into one table. What differs
+/// between single runs is taken from their resolved.yaml.
+/// @throws ConfigError if a folder is neither, or a sweep has no sweep.csv yet.
+ResultTable read_results(const std::vector<std::filesystem::path>& folders);
+
+}  // namespace arex::sim

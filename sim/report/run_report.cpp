@@ -1,0 +1,253 @@
+#include "report/run_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "report/map_picture.h"
+#include "report/page.h"
+#include "report/payload.h"
+
+namespace arex::sim {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMaxEvents = 2000;     // rows of the page's table
+constexpr std::size_t kMaxDecisions = 1000;  // likewise
+
+/// Reads a summary whose sections may be null.
+class Summary {
+ public:
+  explicit Summary(ordered_json json) : json_(std::move(json)) {}
+
+  [[nodiscard]] std::optional<double> number(const char* pointer) const {
+    const auto* value = find(pointer);
+    return value && value->is_number() ? std::optional(value->get<double>()) : std::nullopt;
+  }
+  [[nodiscard]] std::string text(const char* pointer) const {
+    const auto* value = find(pointer);
+    if (!value) return {};
+    return value->is_string() ? value->get<std::string>() : value->dump();
+  }
+
+ private:
+  [[nodiscard]] const ordered_json* find(const char* pointer) const {
+    const ordered_json::json_pointer path(pointer);
+    return json_.contains(path) ? &json_.at(path) : nullptr;
+  }
+  ordered_json json_;
+};
+
+std::string percent(double fraction) { return number_text(100 * fraction, 3) + " %"; }
+std::string metres(double value) { return number_text(value, 3) + " m"; }
+std::string millimetres(double value) { return number_text(1000 * value, 3) + " mm"; }
+std::string seconds(double value) { return number_text(std::round(10 * value) / 10, 5) + " s"; }
+
+std::vector<KeyFigure> key_figures(const Summary& summary) {
+  std::vector<KeyFigure> figures;
+  const auto add = [&](const char* label, const char* pointer, auto text, std::string note = "") {
+    if (const auto value = summary.number(pointer)) {
+      figures.push_back({label, text(*value), std::move(note)});
+    }
+  };
+  const auto note = [&](const char* before, const char* pointer, auto text) {
+    const auto value = summary.number(pointer);
+    return value ? before + text(*value) : std::string();
+  };
+  const auto count = [](double value) { return number_text(value, 9); };
+  add("Flight time", "/sim_time_s", seconds,
+      note("host ", "/wall_time_s", seconds) + note(", ", "/real_time_factor", [](double v) {
+        return number_text(v) + " × real time";
+      }));
+  add("Distance", "/distance_m", metres);
+  add("Area covered", "/coverage/area_fraction", percent,
+      note("95 % after ", "/coverage/t95_s", seconds));
+  add("Surface covered", "/coverage/surface_fraction", percent);
+  add("Odometry error, RMS", "/odometry/ate_rmse_m", millimetres,
+      note("most ", "/odometry/ate_max_m", millimetres) +
+          note(", yaw ", "/odometry/yaw_error_max_deg",
+               [](double v) { return number_text(v, 2) + "°"; }));
+  add("Map error, median", "/map/median_m", millimetres,
+      note("95 % below ", "/map/p95_m", millimetres));
+  add("Least clearance", "/clearance/min_m", metres,
+      note("5 % below ", "/clearance/p05_m", metres));
+  add("Collisions", "/collisions", count);
+  add("Plans", "/planner/replans", count,
+      note("failed ", "/planner/failures", count) +
+          note(", p99 ", "/planner/p99_ms", [](double v) { return number_text(v) + " ms"; }));
+  add(
+      "Battery used", "/battery/used_wh", [](double v) { return number_text(v) + " Wh"; },
+      note("left ", "/battery/remaining_fraction", percent));
+  return figures;
+}
+
+std::string header_html(const RunRecord& run) {
+  const Summary summary(run.summary ? *run.summary : ordered_json::object());
+  const std::string scenario = summary.text("/scenario");
+  const std::string outcome = run.summary ? summary.text("/outcome") : "unfinished";
+  const std::string name = scenario.empty() ? run.folder.filename().string()
+                                            : scenario + ", seed " + summary.text("/seed");
+  std::string html = "<h1>" + escape_html(name) + " <span class=\"badge " + escape_html(outcome) +
+                     "\">" + escape_html(outcome) + "</span></h1>\n";
+  if (!run.summary) {
+    html +=
+        "<p class=\"notice\">This run is unfinished: the folder has no summary.json. "
+        "What it recorded until then is shown.</p>\n";
+    return html;
+  }
+  html += "<p>" + escape_html(summary.text("/reason"));
+  const std::string source = summary.text("/odometry/source");
+  if (!source.empty()) html += ". Odometry: " + escape_html(source);
+  const std::string hash = summary.text("/trajectory_hash");
+  if (!hash.empty()) html += ". Trajectory <code>" + escape_html(hash) + "</code>";
+  const std::string version = summary.text("/build/version");
+  if (!version.empty()) html += ", build " + escape_html(version);
+  html += "</p>\n";
+  return html + key_figures_html(key_figures(summary));
+}
+
+std::string map_html(const RunRecord& run) {
+  const std::string svg = map_picture_svg(run);
+  if (svg.empty()) return {};
+  return "<section>\n<h2>Path over the map</h2>\n<figure>\n" + svg +
+         "<figcaption class=\"map-key\">"
+         "<span><i style=\"border-color:var(--estimate)\"></i>estimated path</span>"
+         "<span><i style=\"border-color:var(--truth);border-top-style:dashed\"></i>true path</span>"
+         "<span><i class=\"ring\"></i>start</span><span style=\"color:var(--bad)\">× end</span>"
+         "<span><i class=\"dot\" style=\"background:var(--target)\"></i>target</span>"
+         "<span><i class=\"dot\" style=\"background:var(--good)\"></i>target reached</span>" +
+         std::string(run.decisions.rows.empty()
+                         ? ""
+                         : "<span><i class=\"dot\" style=\"background:var(--candidate)\"></i>"
+                           "candidate</span>") +
+         (run.map ? "" : "<span>No 2D map was recorded: the cloud seen from above.</span>") +
+         "</figcaption>\n</figure>\n</section>\n";
+}
+
+std::string timing_html(const Table& timing) {
+  const auto totals = timing.numbers("total_s");
+  if (totals.empty()) return {};
+  double most = 0;
+  for (const double total : totals) most = std::max(most, std::isfinite(total) ? total : 0);
+  std::string html =
+      "<section>\n<h2>Where the host's time went</h2>\n<div class=\"scroll\"><table class=\"data "
+      "timing\">\n<thead><tr><th class=\"word\">module</th><th>calls</th><th>median, ms</th>"
+      "<th>p99, ms</th><th>total, s</th><th></th></tr></thead>\n<tbody>\n";
+  for (std::size_t i = 0; i < timing.rows.size(); ++i) {
+    html += "<tr><td class=\"word\">" + escape_html(timing.text(i, "module")) + "</td>";
+    for (const char* name : {"calls", "median_ms", "p99_ms", "total_s"}) {
+      html += "<td>" + escape_html(timing.text(i, name)) + "</td>";
+    }
+    const double share = most > 0 && std::isfinite(totals[i]) ? totals[i] / most : 0;
+    html += "<td class=\"wide\"><span class=\"bar\" style=\"width:" +
+            number_text(std::round(1000 * share) / 10, 4) + "%\"></span></td></tr>\n";
+  }
+  return html + "</tbody>\n</table></div>\n</section>\n";
+}
+
+// A row a decision that chose a target or stopped: how many candidates, and the winner's terms.
+std::string decisions_html(const Table& decisions) {
+  std::string rows;
+  std::size_t count = 0;
+  for (std::size_t begin = 0, end = 0; begin < decisions.rows.size(); begin = end) {
+    const std::string number = decisions.text(begin, "decision");
+    std::size_t kept = 0;
+    std::optional<std::size_t> winner;
+    for (end = begin; end < decisions.rows.size() && decisions.text(end, "decision") == number;
+         ++end) {
+      if (decisions.text(end, "verdict") == "kept") ++kept;
+      if (decisions.text(end, "winner") == "1") winner = end;
+    }
+    const std::string kind = decisions.text(begin, "kind");
+    if (kind == "keep_target" || ++count > kMaxDecisions) continue;
+    const std::string time = escape_html(decisions.text(begin, "time_s"));
+    const std::string stop = decisions.text(begin, "stop_reason");
+    const bool some = !decisions.text(begin, "candidate").empty();
+    rows.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
+    rows.append("</td><td class=\"word\">").append(escape_html(kind));
+    if (kind == "stop") rows.append(": ").append(escape_html(stop));
+    rows.append("</td><td>").append(some ? std::to_string(end - begin) : "0");
+    rows.append("</td><td>").append(std::to_string(kept)).append("</td>");
+    for (const char* name : {"information_m2", "distance_m", "angle_rad", "revenue"}) {
+      rows += "<td>";
+      if (winner) rows += escape_html(decisions.text(*winner, name));
+      rows += "</td>";
+    }
+    rows += "</tr>\n";
+  }
+  if (rows.empty()) return {};
+  return "<section id=\"decisions\">\n<h2>Decisions</h2>\n<div class=\"scroll\"><table "
+         "class=\"data\">\n<thead><tr><th>time, s</th><th class=\"word\">kind</th>"
+         "<th>candidates</th><th>kept</th><th>information, m²</th><th>distance, m</th>"
+         "<th>angle, rad</th><th>revenue</th></tr></thead>\n<tbody>\n" +
+         rows + "</tbody>\n</table></div>\n</section>\n";
+}
+
+std::string events_html(const Table& events) {
+  if (events.rows.empty()) return {};
+  std::map<std::string, std::size_t> kinds;
+  for (std::size_t i = 0; i < events.rows.size(); ++i) ++kinds[events.text(i, "kind")];
+  std::string html = "<section id=\"events\">\n<h2>Events</h2>\n<ul class=\"chips\">";
+  for (const auto& [kind, count] : kinds) {
+    html += "<li>" + escape_html(kind) + " " + std::to_string(count) + "</li>";
+  }
+  html +=
+      "</ul>\n<div class=\"scroll\"><table class=\"data\">\n<thead><tr><th>time, s</th>"
+      "<th class=\"word\">kind</th><th class=\"text\">detail</th></tr></thead>\n<tbody>\n";
+  for (std::size_t i = 0; i < std::min(events.rows.size(), kMaxEvents); ++i) {
+    const std::string time = escape_html(events.text(i, "time_s"));
+    html.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
+    html.append("</td><td class=\"word\">").append(escape_html(events.text(i, "kind")));
+    html.append("</td><td class=\"text\">").append(escape_html(events.text(i, "detail")));
+    html += "</td></tr>\n";
+  }
+  html += "</tbody>\n</table></div>\n";
+  if (events.rows.size() > kMaxEvents) {
+    html += "<p class=\"note\">The first " + std::to_string(kMaxEvents) + " of " +
+            std::to_string(events.rows.size()) + "; the rest stands in events.csv.</p>\n";
+  }
+  return html + "</section>\n";
+}
+
+std::string details_html(const RunRecord& run) {
+  std::string html = "<section>\n<h2>In full</h2>\n";
+  if (run.summary) {
+    html += "<details><summary>summary.json</summary><pre>" + escape_html(run.summary->dump(2)) +
+            "</pre></details>\n";
+  }
+  if (!run.resolved_yaml.empty()) {
+    html += "<details><summary>resolved.yaml</summary><pre>" + escape_html(run.resolved_yaml) +
+            "</pre></details>\n";
+  }
+  if (!run.missing.empty()) {
+    html += "<p class=\"note\">Not in the run folder:";
+    for (const std::string& name : run.missing) html += " " + escape_html(name);
+    html += "</p>\n";
+  }
+  return html + "</section>\n";
+}
+
+}  // namespace
+
+std::string run_report_html(const RunRecord& run) {
+  std::string html = header_html(run);
+  html +=
+      "<noscript><p class=\"notice\">The replay and the charts need JavaScript; the rest of "
+      "this page does not.</p></noscript>\n";
+  html += "<section id=\"replay\"></section>\n";
+  html += map_html(run);
+  html += "<section>\n<h2>Against time</h2>\n<div id=\"charts\"></div>\n</section>\n";
+  html +=
+      "<div class=\"columns\">\n" + timing_html(run.timing) + events_html(run.events) + "</div>\n";
+  html += decisions_html(run.decisions);
+  html += details_html(run);
+  std::string name = run.folder.filename().string();
+  return report_page(
+      "AREX: " + (name.empty() ? run.folder.parent_path().filename().string() : name), html,
+      run_payload(run));
+}
+
+}  // namespace arex::sim

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "report/run_record.h"
+
+namespace arex::sim {
+
+/// What a report shows of a cloud at most: what the page's size allows.
+inline constexpr std::size_t kMaxReportPoints = 200'000;
+
+/// report.html of one run: summary, path over the map, events and timing as plain HTML; replay and
+/// charts by the embedded viewer. Parts that a run did not record are left out and named.
+std::string run_report_html(const RunRecord& run);
+
+/// What the viewer draws, compact. The fields are those of RunPayload in
+/// scripts/report/src/payload.ts.
+nlohmann::ordered_json run_payload(const RunRecord& run);
+
+}  // namespace arex::sim

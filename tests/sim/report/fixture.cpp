@@ -1,0 +1,33 @@
+// Writes what the browser test opens: FOLDER/run, FOLDER/old (without the growth of its cloud) and
+// FOLDER/sweep and FOLDER/cube, each with its report.
+
+#include <cstdio>
+#include <filesystem>
+
+#include "report/comparison_report.h"
+#include "report/page.h"
+#include "report/run_report.h"
+#include "synthetic_run.h"
+
+int main(int argc, char** argv) {
+  using namespace arex::sim;
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: report_fixture FOLDER\n");
+    return 2;
+  }
+  const std::filesystem::path folder(argv[1]);
+  for (const char* name : {"run", "old"}) {
+    test::write_synthetic_run(folder / name, {});
+    if (name == std::string("old")) std::filesystem::remove(folder / name / "cloud_growth.csv");
+    const RunRecord run = read_run(folder / name, kMaxReportPoints);
+    write_page(folder / name / "report.html", run_report_html(run));
+  }
+  test::write_synthetic_sweep(folder / "sweep");
+  test::write_synthetic_hypercube(folder / "cube");
+  for (const char* name : {"sweep", "cube"}) {
+    const std::filesystem::path sweep = folder / name;
+    write_page(sweep / "report.html",
+               comparison_report_html(read_results({sweep}), "Sweep", sweep));
+  }
+  return 0;
+}

@@ -46,6 +46,7 @@ void add_pillar(MeshBuilder& builder, const Vec2& p, double radius, double heigh
 }  // namespace
 
 World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
+  constexpr double kWallThickness = 0.2;
   MeshBuilder builder;
   RandomStream random(seed, "worlds/gaps");
   const Vec2 low(-recipe.start_radius_m, -recipe.width_m / 2);
@@ -62,13 +63,21 @@ World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
       add_pillar(builder, {recipe.wall_distance_m, y}, radius, recipe.pillar_height_m, random);
       y += side * (2 * radius + recipe.slot_m);
     }
-    constexpr double kWallThickness = 0.2;
     builder.add_solid_box(
         builder.add_object(SurfaceClass::kWall, kConcreteReflectivity.draw(random)),
         {Mat3::Identity(),
          {(low.x() + high.x()) / 2, side * (recipe.width_m + kWallThickness) / 2,
           recipe.pillar_height_m / 2}},
         {recipe.length_m / 2, kWallThickness / 2, recipe.pillar_height_m / 2});
+  }
+
+  // Where nothing returns a ray, nothing shows that the space before it is free: the ends are
+  // walled too.
+  for (const double x : {low.x() - kWallThickness / 2, high.x() + kWallThickness / 2}) {
+    builder.add_solid_box(
+        builder.add_object(SurfaceClass::kWall, kConcreteReflectivity.draw(random)),
+        {Mat3::Identity(), {x, 0, recipe.pillar_height_m / 2}},
+        {kWallThickness / 2, recipe.width_m / 2, recipe.pillar_height_m / 2});
   }
 
   // The field ends a vehicle's length before the wall, so that the gap alone decides there.

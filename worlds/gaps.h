@@ -27,7 +27,7 @@ struct GapsRecipe {
 
   void fields(auto& f) {
     f("length_m", length_m, "extent along x: from start_radius_m behind the start");
-    f("width_m", width_m, "extent along y, the start in its middle; walled at both sides");
+    f("width_m", width_m, "extent along y, the start in its middle; walled all round");
     f("wall_distance_m", wall_distance_m, "x of the pillars' axes");
     f("pillar_radius_m", pillar_radius_m, "of the pillars in the wall");
     f("pillar_height_m", pillar_height_m, "of every pillar");

@@ -131,15 +131,11 @@ ConfigNode load_yaml(const std::filesystem::path& file) {
   return parse_yaml(text.str(), file.string());
 }
 
-void apply_override(ConfigNode& root, const std::string& assignment) {
-  const auto equals = assignment.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    config_detail::fail(std::string(kOverride) + " " + assignment, "expected key=value");
-  }
-  const std::string path = assignment.substr(0, equals);
-  const std::string where = std::string(kOverride) + " " + path;
+void set_value(ConfigNode& root, const std::string& dotted_key, const std::string& where,
+               ConfigNode value) {
   ConfigNode* node = &root;
-  std::istringstream keys(path);
+  std::string* leaf_where = nullptr;
+  std::istringstream keys(dotted_key);
   for (std::string key; std::getline(keys, key, '.');) {
     node->kind = ConfigNode::Kind::kMap;
     auto entry = std::find_if(node->entries.begin(), node->entries.end(),
@@ -150,9 +146,22 @@ void apply_override(ConfigNode& root, const std::string& assignment) {
       entry->value.where = where;
     }
     node = &entry->value;
+    leaf_where = &entry->where;
   }
+  *node = std::move(value);
+  if (leaf_where) *leaf_where = where;
+}
+
+void apply_override(ConfigNode& root, const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    config_detail::fail(std::string(kOverride) + " " + assignment, "expected key=value");
+  }
+  const std::string path = assignment.substr(0, equals);
+  const std::string where = std::string(kOverride) + " " + path;
+  ConfigNode value;
   try {
-    *node = convert(YAML::Load(assignment.substr(equals + 1)), where);
+    value = convert(YAML::Load(assignment.substr(equals + 1)), where);
   } catch (const YAML::Exception& error) {
     config_detail::fail(where, "not valid YAML: " + error.msg);
   }
@@ -162,7 +171,8 @@ void apply_override(ConfigNode& root, const std::string& assignment) {
     for (auto& entry : n.entries) entry.where = where, self(self, entry.value);
     for (auto& item : n.items) self(self, item);
   };
-  relabel(relabel, *node);
+  relabel(relabel, value);
+  set_value(root, path, where, std::move(value));
 }
 
 std::string write_yaml(const std::vector<ParameterInfo>& parameters) {

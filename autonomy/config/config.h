@@ -53,6 +53,9 @@ struct ConfigNode::Entry {
 ConfigNode load_yaml(const std::filesystem::path& file);
 /// The same from text; `name` stands for the file in messages.
 ConfigNode parse_yaml(const std::string& text, const std::string& name);
+/// Puts `value` at a dotted key, over what stands there; messages will name `where`.
+void set_value(ConfigNode& root, const std::string& dotted_key, const std::string& where,
+               ConfigNode value);
 /// Applies one `--set a.b=value` over what the file says. @throws ConfigError if it has no '='.
 void apply_override(ConfigNode& root, const std::string& assignment);
 

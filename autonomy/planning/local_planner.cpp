@@ -426,6 +426,7 @@ void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& 
   if (stop) {
     result.trajectory = *std::move(stop);
     result.goal = result.trajectory.control_points().back();
+    result.diagnostics.braked = true;
   } else {
     result.trajectory = {};
     result.status = PlanStatus::kRefineRejected;

@@ -58,6 +58,7 @@ struct PlanDiagnostics {
   bool reallocated = false;  ///< time was re-allocated and the shape refined
   bool retimed = false;      ///< the path was timed anew
   bool slowed = false;       ///< for unknown space
+  bool braked = false;       ///< too fast for the unknown ahead: it only comes to rest
   bool goal_shifted = false;
   bool start_inflated = false;  ///< the inflation was shrunk about the start
 };

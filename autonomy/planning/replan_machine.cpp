@@ -301,7 +301,7 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   tries_ = 0;
   Flight flight{last_plan_.trajectory, begin, begin};
   flight.slowed = last_plan_.diagnostics.slowed;
-  flight.reaches_target = final_target;
+  flight.reaches_target = final_target && !last_plan_.diagnostics.braked;
   if (from_rest) {  // look first, then fly
     const double wanted = yaw_planner_.wanted(flight.spline, 0.0, heading_.yaw_rad);
     flight.start += from_seconds(yaw_planner_.turn_time_s(heading_.yaw_rad, wanted));

@@ -18,8 +18,11 @@ struct ScenarioArguments {
 
 struct RunArguments {
   ScenarioArguments scenario;
-  std::string out;  ///< empty: runs/<scenario>-seed<seed>
-  std::string bag;  ///< ROS 1 bag to write; empty: none
+  std::string out;                        ///< empty: runs/<scenario>-seed<seed>
+  std::string name;                       ///< of the scenario, in the summary; empty: the file's
+  std::string bag;                        ///< ROS 1 bag to write; empty: none
+  std::vector<std::string> requirements;  ///< of the summary: field>=value
+  std::string junit;                      ///< JUnit file to write; empty: none
   int threads = 1;
   bool quiet = false;
 };
@@ -50,6 +53,24 @@ struct RenderArguments {
   double speed = 8;  ///< seconds of flight in a second of film
 };
 int render(const RenderArguments& arguments);
+
+struct SweepArguments {
+  std::string file;
+  std::string out;
+  int jobs = 0;          ///< runs at a time; 0: one a core
+  bool dry_run = false;  ///< list what would run
+  bool status = false;   ///< say what has run
+  bool slurm = false;    ///< submit instead of flying here
+  std::vector<std::string> sbatch_options;
+};
+int sweep(const SweepArguments& arguments);
+
+/// What a job of `sweep --slurm` does: one run of a batch.
+struct SweepTaskArguments {
+  std::string batch;
+  std::size_t index = 0;
+};
+int sweep_task(const SweepTaskArguments& arguments);
 
 struct ReportArguments {
   std::vector<std::string> folders;  ///< run folders and sweeps

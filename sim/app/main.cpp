@@ -1,6 +1,9 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "app/commands.h"
 #include "config/config.h"
@@ -22,7 +25,13 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("run", "fly a scenario, write a scored run folder");
   add_scenario_options(*command, arguments.scenario, true);
   command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
+  command->add_option("--name", arguments.name, "the scenario's name; default the file's");
   command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
+  command
+      ->add_option("--require", arguments.requirements,
+                   "field>=value of the summary, else exit code 1; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
   command->add_option("--threads", arguments.threads, "host threads; the result does not change")
       ->check(CLI::Range(1, 64));
   command->add_flag("--quiet", arguments.quiet, "no progress line");
@@ -70,6 +79,36 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = render(arguments); });
 }
 
+void add_sweep(CLI::App& app, SweepArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("sweep", "fly many runs, each a process of its own");
+  command->add_option("sweep", arguments.file, "sweep file, scenarios/sweeps/*.yaml")->required();
+  command->add_option("--out", arguments.out, "folder; the same command there goes on")->required();
+  command->add_option("--jobs", arguments.jobs, "runs at a time; default one a core")
+      ->check(CLI::Range(1, 1024));
+  command->add_flag("--dry-run", arguments.dry_run, "list the runs, write nothing");
+  command->add_flag("--status", arguments.status, "say how far it is, write nothing");
+  command->add_flag("--slurm", arguments.slurm,
+                    "submit to Slurm what is missing; all that follows goes to sbatch");
+  command->callback([&] { exit_code = sweep(arguments); });
+}
+
+void add_sweep_task(CLI::App& app, SweepTaskArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("sweep-task", "one run of a batch of 'sweep --slurm'");
+  command->group("");  // for Slurm, not for people
+  command->add_option("batch", arguments.batch, "file of the batch")->required();
+  command->add_option("index", arguments.index, "of the run in it")->required();
+  command->callback([&] { exit_code = sweep_task(arguments); });
+}
+
+// Everything behind --slurm is sbatch's, whatever it looks like.
+std::vector<std::string> take_sbatch_options(std::vector<std::string>& arguments) {
+  const auto slurm = std::find(arguments.begin(), arguments.end(), "--slurm");
+  if (arguments.empty() || arguments[0] != "sweep" || slurm == arguments.end()) return {};
+  std::vector<std::string> options(slurm + 1, arguments.end());
+  arguments.erase(slurm + 1, arguments.end());
+  return options;
+}
+
 void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("report", "write report.html beside recorded data");
   command
@@ -83,13 +122,15 @@ void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones"};
+  CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones", "arex"};
   app.require_subcommand(1);
   int exit_code = 0;
   RunArguments run_arguments;
   WorldArguments world_arguments;
   PatternArguments pattern_arguments;
   RenderArguments render_arguments;
+  SweepArguments sweep_arguments;
+  SweepTaskArguments sweep_task_arguments;
   ReportArguments report_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
@@ -97,6 +138,8 @@ int main(int argc, char** argv) {
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
   add_render(app, render_arguments, exit_code);
+  add_sweep(app, sweep_arguments, exit_code);
+  add_sweep_task(app, sweep_task_arguments, exit_code);
   add_report(app, report_arguments, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
@@ -106,7 +149,10 @@ int main(int argc, char** argv) {
   validate_command->callback([&] { exit_code = validate(validate_arguments); });
 
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> words(argv + 1, argv + argc);
+    sweep_arguments.sbatch_options = take_sbatch_options(words);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    app.parse(words);
     return exit_code;
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);

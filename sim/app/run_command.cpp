@@ -6,12 +6,15 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include "app/commands.h"
 #include "run/recorder.h"
+#include "run/requirement.h"
 #include "run/scenario.h"
 #include "run/simulation.h"
 #include "run/summary.h"
@@ -83,14 +86,54 @@ int exit_code_of(sim::Outcome outcome) {
   return outcome == sim::Outcome::kInterrupted ? 128 + SIGINT : 1;
 }
 
+std::vector<sim::Requirement> parse_requirements(const RunArguments& arguments) {
+  std::vector<sim::Requirement> requirements;
+  for (const std::string& text : arguments.requirements) {
+    requirements.push_back(sim::parse_requirement(text));
+  }
+  return requirements;
+}
+
+// The flight may take minutes: that its verdict cannot be written is said before.
+void check_writable(const std::string& file) {
+  if (file.empty()) return;
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  if (access(folder.c_str(), W_OK) != 0 || std::filesystem::is_directory(file)) {
+    throw ConfigError(file + ": cannot be written, expected a file in a folder that exists");
+  }
+}
+
+/// @return whether every requirement is met; one line for each that is not.
+bool judge(const std::vector<sim::Requirement>& requirements,
+           const nlohmann::ordered_json& summary) {
+  bool all = true;
+  for (const sim::Requirement& requirement : requirements) {
+    const std::string violation = sim::violation(requirement, summary);
+    if (violation.empty()) continue;
+    all = false;
+    std::fprintf(stderr, "arex: required %s, but %s\n", requirement.text.c_str(),
+                 violation.c_str());
+  }
+  return all;
+}
+
+void write_junit(const std::string& file, const std::string& xml) {
+  std::ofstream stream(file);
+  stream << xml;
+  if (!stream.flush()) throw std::runtime_error(file + ": cannot be written");
+}
+
 }  // namespace
 
 int run(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   const double cpu_begin = cpu_seconds();
-  const sim::Scenario scenario = sim::load_scenario(
-      arguments.scenario.file, arguments.scenario.overrides, arguments.scenario.seed);
+  sim::Scenario scenario = sim::load_scenario(arguments.scenario.file, arguments.scenario.overrides,
+                                              arguments.scenario.seed);
+  if (!arguments.name.empty()) scenario.name = arguments.name;
   const std::filesystem::path folder = run_folder(arguments, scenario);
+  const std::vector<sim::Requirement> requirements = parse_requirements(arguments);
+  check_writable(arguments.junit);
 
   // The world is built before anything is written: a bad recipe leaves nothing.
   sim::Simulation simulation(scenario, arguments.threads);
@@ -121,10 +164,15 @@ int run(const RunArguments& arguments) {
     recorder->write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
   }
   recorder->write_file("timing.csv", sim::timing_csv(result.timing));
-  recorder->write_summary(
-      sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}));
+  const nlohmann::ordered_json summary =
+      sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin});
+  recorder->write_summary(summary);
   if (!arguments.quiet) print_result(result, folder);
-  return exit_code_of(result.outcome);
+  if (!arguments.junit.empty()) {
+    write_junit(arguments.junit, sim::junit_xml(summary, requirements));
+  }
+  const int exit_code = exit_code_of(result.outcome);
+  return judge(requirements, summary) || exit_code != 0 ? exit_code : 1;
 }
 
 }  // namespace arex::app

@@ -1,5 +1,7 @@
 #include "run/summary.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -12,6 +14,8 @@ namespace arex::sim {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr const char* kPlannerModule = "replan";  // its row of timing.csv
 
 // Numbers for people: six significant decimals are more than any of these hold.
 double rounded(double value) { return std::round(value * 1e6) / 1e6; }
@@ -79,13 +83,28 @@ ordered_json coverage_json(const std::optional<CoverageResult>& coverage) {
 ordered_json planner_json(const FlightResult& result) {
   if (result.plans == 0) return nullptr;
   for (const TimingRow& row : result.timing) {
-    if (row.module != "replan") continue;
+    if (row.module != kPlannerModule) continue;
     return {{"replans", result.plans},
             {"median_ms", rounded(row.median_ms)},
             {"p99_ms", rounded(row.p99_ms)},
             {"failures", result.plan_failures}};
   }
   return nullptr;
+}
+
+void flatten_into(const ordered_json& value, const std::string& key,
+                  std::vector<std::pair<std::string, std::string>>& fields) {
+  if (value.is_object()) {
+    for (const auto& [name, child] : value.items()) {
+      flatten_into(child, key.empty() ? name : key + "." + name, fields);
+    }
+  } else if (value.is_array()) {
+    fields.emplace_back(key + ".count", std::to_string(value.size()));
+  } else if (value.is_null()) {
+    fields.emplace_back(key, "");
+  } else {
+    fields.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
+  }
 }
 
 }  // namespace
@@ -120,6 +139,29 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
       result.renderer.empty() ? ordered_json(nullptr) : ordered_json(result.renderer);
   json["build"] = {{"version", AREX_VERSION}, {"compiler", "g++ " __VERSION__}};
   return json;
+}
+
+std::vector<std::pair<std::string, std::string>> flatten(const ordered_json& summary) {
+  std::vector<std::pair<std::string, std::string>> fields;
+  flatten_into(summary, "", fields);
+  return fields;
+}
+
+ordered_json full_summary() {
+  FlightResult result;
+  result.map.emplace();
+  result.coverage.emplace();
+  for (ClassCoverage& c : result.coverage->classes) c.visible = 1;
+  result.plans = 1;
+  result.timing.push_back({kPlannerModule, 1, 0, 0, 0});
+  result.renderer = "any";
+  return summarise({}, result, {});
+}
+
+bool depends_on_host(std::string_view key) {
+  static constexpr std::array<std::string_view, 5> kHostFields{
+      "wall_time_s", "cpu_time_s", "real_time_factor", "planner.median_ms", "planner.p99_ms"};
+  return std::find(kHostFields.begin(), kHostFields.end(), key) != kHostFields.end();
 }
 
 std::string odometry_error_csv(const std::vector<PosePair>& poses) {

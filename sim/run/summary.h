@@ -2,6 +2,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "run/scenario.h"
 #include "run/simulation.h"
@@ -17,6 +20,16 @@ struct HostTime {
 /// summary.json: the contract's names. Sections that this run has no module for are null.
 nlohmann::ordered_json summarise(const Scenario& scenario, const FlightResult& result,
                                  const HostTime& host);
+
+/// Every number and text of a summary with its dotted key; a list by its length, `targets.count`.
+std::vector<std::pair<std::string, std::string>> flatten(const nlohmann::ordered_json& summary);
+
+/// A summary that has every section, whatever its values: what fields there are.
+nlohmann::ordered_json full_summary();
+
+/// Whether a summary's field, by its dotted key, is a time of the host: two runs of one scenario
+/// differ in these only.
+bool depends_on_host(std::string_view key);
 
 /// odometry_error.csv: estimate minus truth, aligned at the first pose; position in W, m, and
 /// rotation vector in W, rad.

@@ -304,5 +304,25 @@ TEST(ReplanMachine, LooksBeforeItFliesAndNeverOutrunsWhatItKnows) {
   EXPECT_LT(worst, 0.05);
 }
 
+TEST(ReplanMachine, BrakesBeforeSpaceThatTurnsOutUnknownAndThenFliesOn) {
+  test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {2.05, 4.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({13.05, 4.05, 1.05}, {}, flight.now_);
+  while (flight.last_.p_OB.x() < 8.0 && machine.has_target()) flight.step(grid.view());
+  // The target is in sight and planned to, then the map forgets what is a metre ahead.
+  const double speed = flight.last_.v_OB.norm();
+  ASSERT_GT(speed, 1.5);
+  grid.forget({88, 0, 0}, {159, 79, 19});
+  flight.run(grid.view(), 4);
+  EXPECT_TRUE(machine.has_target());
+  EXPECT_LT(flight.last_.v_OB.norm(), LocalPlannerConfig().unknown_speed_mps * 1.1);
+  grid.mark({0, 0, 0}, {159, 79, 19}, GridView::kKnown);  // a look is enough
+  flight.run(grid.view(), 20);
+  EXPECT_EQ(flight.count(PlannerEventKind::kAskForTarget), 0);
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+}
+
 }  // namespace
 }  // namespace arex

@@ -1,61 +1,27 @@
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "support/temporary_folder.h"
+#include "support/process.h"
 
 // The contract of the command line, kept by the binary itself.
 namespace arex {
 namespace {
 
+using Result = test::ProcessResult;
 using test::read_text;
 using test::TemporaryFolder;
 using test::write_text;
 
 constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
 
-struct Result {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
-
-/// The binary as a child of ours.
-class Process {
- public:
-  Process(const std::vector<std::string>& arguments, const TemporaryFolder& folder)
-      : out_(folder / "stdout"), err_(folder / "stderr") {
-    pid_ = fork();
-    if (pid_ != 0) return;
-    dup2(creat(out_.c_str(), 0600), STDOUT_FILENO);
-    dup2(creat(err_.c_str(), 0600), STDERR_FILENO);
-    std::vector<char*> argv{const_cast<char*>(AREX_BINARY)};
-    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-    argv.push_back(nullptr);
-    execv(AREX_BINARY, argv.data());
-    _exit(127);
-  }
-  void signal(int number) const { kill(pid_, number); }
-  Result wait() const {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out_),
-            read_text(err_)};
-  }
-
- private:
-  std::filesystem::path out_, err_;
-  pid_t pid_ = -1;
-};
+test::Process start(const std::vector<std::string>& arguments, const TemporaryFolder& folder) {
+  return {AREX_BINARY, arguments, folder.path()};
+}
 
 Result run(const std::vector<std::string>& arguments) {
-  const TemporaryFolder folder;
-  return Process(arguments, folder).wait();
+  return test::run_process(AREX_BINARY, arguments);
 }
 
 void wait_for(const std::filesystem::path& file, std::size_t bytes) {
@@ -96,6 +62,8 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   expect_refused("seed: 1\n", {"--set", "seed"}, "expected key=value");
   expect_refused("seed: 1\n", {"--threads", "none"}, "--threads");
   expect_refused("seed: 1\n", {"--seed", "-1"}, "--seed");
+  expect_refused("seed: 1\n", {"--require", "colisions==0"}, "did you mean 'collisions'?");
+  expect_refused("seed: 1\n", {"--junit", "/does/not/exist/x.xml"}, "/does/not/exist/x.xml");
   expect_refused("seed: 1\n", {"--bag", "/does/not/exist/x.bag"}, "/does/not/exist/x.bag");
   const Result missing = run({"run", "/does/not/exist.yaml"});
   EXPECT_EQ(missing.exit_code, 2);
@@ -154,9 +122,38 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
   EXPECT_EQ(summary_again["sensor_hash"], summary["sensor_hash"]);
 }
 
+TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {
+  const TemporaryFolder folder;
+  const std::string junit = (folder / "junit.xml").string();
+  std::vector<std::string> arguments{"run",
+                                     AREX_SOURCE_DIR "/scenarios/yaw_burst.yaml",
+                                     "--set",
+                                     "mission.yaw_rates_radps=[1]",
+                                     "--set",
+                                     "mission.yaw_burst_s=1",
+                                     "--quiet",
+                                     "--out",
+                                     (folder / "run").string(),
+                                     "--junit",
+                                     junit,
+                                     "--require",
+                                     "collisions==0"};
+  const Result met = run(arguments);
+  EXPECT_EQ(met.exit_code, 0) << met.err;
+  EXPECT_NE(read_text(junit).find("tests=\"2\" failures=\"0\""), std::string::npos);
+  arguments.insert(arguments.end(), {"--require", "distance_m>=100"});
+  const Result violated = run(arguments);
+  EXPECT_EQ(violated.exit_code, 1);
+  EXPECT_EQ(violated.err.find("arex: required distance_m>=100, but distance_m is "), 0u)
+      << violated.err;
+  EXPECT_EQ(std::count(violated.err.begin(), violated.err.end(), '\n'), 1) << violated.err;
+  EXPECT_NE(read_text(junit).find("tests=\"3\" failures=\"1\""), std::string::npos);
+}
+
 TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {
   const TemporaryFolder folder;
-  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  const auto process =
+      start({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
   wait_for(folder / "run/truth.tum", 100'000);
   process.signal(SIGINT);
   EXPECT_EQ(process.wait().exit_code, 130);
@@ -166,7 +163,8 @@ TEST(CommandLine, AnInterruptedRunKeepsWhatItFlew) {
 
 TEST(CommandLine, AKilledRunLeavesNothingThatLooksFinished) {
   const TemporaryFolder folder;
-  const Process process({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
+  const auto process =
+      start({"run", kWaypoints, "--quiet", "--out", (folder / "run").string()}, folder);
   wait_for(folder / "run/truth.tum", 100'000);
   process.signal(SIGKILL);
   EXPECT_EQ(process.wait().exit_code, 128 + SIGKILL);

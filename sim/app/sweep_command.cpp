@@ -1,0 +1,293 @@
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "app/commands.h"
+#include "sweep/file_io.h"
+#include "sweep/slurm.h"
+#include "sweep/supervisor.h"
+#include "sweep/sweep_file.h"
+#include "sweep/sweep_folder.h"
+#include "sweep/sweep_plan.h"
+#include "sweep/sweep_table.h"
+
+namespace arex::app {
+namespace {
+
+constexpr const char* kSelf = "/proc/self/exe";
+constexpr double kTablePeriod_s = 60;             // a long sweep can be looked at while it flies
+constexpr const char* kDriverLock = ".lock";      // of the local sweep or the submission
+constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
+// A look whether someone is at work holds a lock for a moment.
+constexpr double kPatience_s = 2;
+constexpr double kTaskPatience_s = 60;
+
+int cores() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  return sched_getaffinity(0, sizeof set, &set) == 0 ? std::max(1, CPU_COUNT(&set)) : 1;
+}
+
+std::string clock_text(double seconds) {
+  std::array<char, 32> text{};
+  const long whole = std::lround(seconds);
+  std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60,
+                whole % 60);
+  return text.data();
+}
+
+/// The line that a person watches, and a line of its own for every run that breaks.
+class SweepLine {
+ public:
+  /// @param done runs that were finished before, @param total of the sweep
+  SweepLine(std::size_t done, std::size_t total)
+      : done_(done), total_(total), on_terminal_(isatty(STDERR_FILENO) != 0) {}
+  ~SweepLine() {
+    if (open_) std::fputc('\n', stderr);
+  }
+  SweepLine(const SweepLine&) = delete;
+  SweepLine& operator=(const SweepLine&) = delete;
+
+  void broken(const sim::RunOrder& order, const sim::RunState& state) {
+    const auto name = sim::kFailureNames[static_cast<std::size_t>(state.failure)];
+    if (open_) std::fputs("\r\033[K", stderr);
+    open_ = false;
+    std::fprintf(stderr, "%s: %.*s: %s\n", sim::SweepFolder::failed(order.id).c_str(),
+                 static_cast<int>(name.size()), name.data(), state.detail.c_str());
+  }
+
+  void update(const sim::SweepProgress& p) {
+    const bool last = p.finished + p.broken == p.total;
+    if (!on_terminal_ && !last && p.elapsed_s < next_s_) return;
+    next_s_ = p.elapsed_s + 30;  // a log wants a line now and then
+    std::string left = p.left_s < 0 ? "?" : clock_text(p.left_s);
+    std::fprintf(stderr, "%s%zu/%zu done, %zu running, %zu missions failed, %zu broken, %s, ETA %s",
+                 on_terminal_ ? "\r\033[K" : "", done_ + p.finished, total_, p.running,
+                 p.missions_failed, p.broken, clock_text(p.elapsed_s).c_str(), left.c_str());
+    if (!on_terminal_) std::fputc('\n', stderr);
+    open_ = on_terminal_;
+  }
+
+ private:
+  std::size_t done_;
+  std::size_t total_;
+  bool on_terminal_;
+  bool open_ = false;
+  double next_s_ = 0;
+};
+
+int dry_run(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
+  std::size_t missing = 0;
+  for (const sim::PlannedRun& run : plan.runs) {
+    const bool finished = folder.summary(run.id).has_value();
+    missing += finished ? 0 : 1;
+    std::string text = run.id + (finished ? "  finished  " : "  to fly    ") + run.scenario;
+    if (!run.variant.empty()) text += " " + run.variant;
+    for (std::size_t i = 0; i < plan.keys.size(); ++i) {
+      text += " " + plan.keys[i] + "=" + run.values[i];
+    }
+    text += " seed=" + std::to_string(run.seed);
+    if (plan.repeats > 1) text += " repeat=" + std::to_string(run.repeat);
+    std::printf("%s\n", text.c_str());
+  }
+  std::printf("%zu runs, %zu to fly\n", plan.runs.size(), missing);
+  return 0;
+}
+
+// Empty also where there is no Slurm to ask.
+std::set<std::string> queued_or_none(const sim::SweepFolder& folder) {
+  try {
+    return sim::queued_runs(folder);
+  } catch (const sim::SlurmError&) {
+    return {};
+  }
+}
+
+// Whether what looks as if it were in flight is: what a killed sweep has left does not count.
+bool at_work(const sim::SweepFolder& folder) {
+  if (!std::filesystem::exists(folder.root() / kDriverLock)) return false;
+  try {
+    for (const char* name : {kDriverLock, kWorkersLock}) {
+      if (!sim::FileLock(folder.root() / name, sim::FileLock::Mode::kExclusive).take()) return true;
+    }
+    return false;
+  } catch (const sim::DiskError&) {
+    return true;  // somebody else's folder: one can only look
+  }
+}
+
+int status(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
+  std::map<std::string, std::size_t> counts;
+  std::size_t finished = 0;
+  const std::vector<std::string> partials =
+      at_work(folder) ? folder.partials() : std::vector<std::string>{};
+  const std::set<std::string> queued = queued_or_none(folder);
+  const auto order = plan.flying_order();
+  for (const sim::PlannedRun* run : order) {
+    if (const auto summary = folder.summary(run->id)) {
+      ++finished;
+      ++counts[(*summary)["outcome"].get<std::string>()];
+    } else if (std::binary_search(partials.begin(), partials.end(), run->id)) {
+      ++counts["in flight"];
+    } else if (queued.count(run->id) > 0) {
+      ++counts["in Slurm's queue"];
+    } else {
+      const auto failure = folder.state(run->id).failure;
+      ++counts[std::string(sim::kFailureNames[static_cast<std::size_t>(failure)])];
+    }
+  }
+  std::printf("%s: %zu of %zu finished", plan.name.c_str(), finished, order.size());
+  for (const auto& [what, count] : counts) std::printf(", %zu %s", count, what.c_str());
+  std::printf("\n");
+  return finished == order.size() ? 0 : 1;
+}
+
+void write_tables(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
+  const sim::SweepTables tables = sim::sweep_tables(plan, folder);
+  sim::write_atomically(folder.root() / "sweep_host.csv", tables.host);
+  sim::write_atomically(folder.root() / "sweep.csv", tables.results);
+}
+
+void warn_of_another_build(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
+  const auto before =
+      nlohmann::json::parse(sim::read_file(folder.root() / "sweep.json"), nullptr, false);
+  if (!before.is_object() || before.value("build", plan.build) == plan.build) return;
+  std::fprintf(stderr, "%s: holds runs of another build, which do not count for this one\n",
+               folder.root().c_str());
+}
+
+std::filesystem::path made_folder(const std::string& out) {
+  std::error_code error;
+  std::filesystem::create_directories(out, error);
+  if (error) throw ConfigError(out + ": " + error.message() + ", expected a folder to write");
+  return std::filesystem::canonical(out);
+}
+
+std::vector<sim::RunOrder> missing_runs(const sim::SweepPlan& plan,
+                                        const sim::SweepFolder& folder) {
+  std::vector<sim::RunOrder> orders;
+  for (const sim::PlannedRun* run : plan.flying_order()) {
+    if (!folder.summary(run->id)) orders.push_back({run->id, run->scenario});
+  }
+  return orders;
+}
+
+[[noreturn]] void fail_on_full_disk(const sim::SweepFolder& folder) {
+  throw std::runtime_error(folder.root().string() +
+                           ": the disk is full; make room and give the same command again");
+}
+
+int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
+  sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
+  if (!workers.take(kPatience_s)) {
+    throw ConfigError(folder.root().string() + ": Slurm's tasks are at work here, expected them " +
+                      "to be over; --status says how far they are");
+  }
+  folder.remove_all_partials();
+  const std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
+  const std::size_t total = plan.flying_order().size();
+  SweepLine line(total - orders.size(), total);
+  double next_table_s = kTablePeriod_s;
+  sim::Supervisor supervisor(
+      folder, kSelf, {jobs, plan.timeout_s, plan.retries},
+      {[&](const auto& order, const auto& state) { line.broken(order, state); },
+       [&](const auto& progress) {
+         line.update(progress);
+         if (progress.elapsed_s < next_table_s) return;
+         next_table_s = progress.elapsed_s + kTablePeriod_s;
+         try {
+           write_tables(plan, folder);
+         } catch (const sim::DiskError&) {
+           // The next run finds out what is wrong with the disk.
+         }
+       }});
+  const sim::SweepEnd end = supervisor.fly(orders);
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
+  write_tables(plan, folder);
+  if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
+  return supervisor.progress().broken == 0 ? 0 : 1;
+}
+
+int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int at_a_time,
+           const std::vector<std::string>& options) {
+  {
+    // What killed jobs have left can go when no task is at work.
+    sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
+    if (workers.take()) folder.remove_all_partials();
+  }
+  // The queue first: what leaves it after this look is finished at the next, or really missing.
+  const std::set<std::string> queued = sim::queued_runs(folder);
+  std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
+  const std::size_t missing = orders.size();
+  std::erase_if(orders, [&](const auto& order) { return queued.count(order.id) > 0; });
+  const auto batches = sim::submit(folder, plan, orders, kSelf, at_a_time, options);
+  for (const sim::SlurmBatch& batch : batches) {
+    std::printf("submitted %zu runs as job %s (%s)\n", batch.runs, batch.job_id.c_str(),
+                batch.name.c_str());
+  }
+  if (missing > orders.size()) {
+    std::printf("%zu runs are in Slurm's queue already\n", missing - orders.size());
+  }
+  write_tables(plan, folder);
+  return 0;
+}
+
+}  // namespace
+
+int sweep(const SweepArguments& arguments) {
+  const sim::SweepPlan plan =
+      sim::expand(sim::load_sweep_file(arguments.file), sim::fingerprint(kSelf));
+  if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
+  if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
+
+  const sim::SweepFolder folder(made_folder(arguments.out));
+  sim::FileLock lock(folder.root() / kDriverLock, sim::FileLock::Mode::kExclusive);
+  if (!lock.take(kPatience_s)) {
+    throw ConfigError(arguments.out + ": another sweep is at work here (" + lock.holder() +
+                      "), expected a folder of its own");
+  }
+  lock.sign("process " + std::to_string(getpid()) + " on " + sim::host_name());
+  warn_of_another_build(plan, folder);
+  folder.prepare(plan);
+  const int result = arguments.slurm
+                         ? submit(plan, folder, arguments.jobs, arguments.sbatch_options)
+                         : fly(plan, folder, arguments.jobs > 0 ? arguments.jobs : cores());
+  std::printf("%s\n", (folder.root() / "sweep.csv").c_str());
+  return result;
+}
+
+int sweep_task(const SweepTaskArguments& arguments) {
+  const std::filesystem::path file = std::filesystem::absolute(arguments.batch);
+  const sim::BatchFile batch = sim::load_batch(file);
+  if (arguments.index >= batch.runs.size()) {
+    throw ConfigError(file.string() + ":1: has " + std::to_string(batch.runs.size()) +
+                      " runs, expected an index below that");
+  }
+  const sim::SweepFolder folder(file.parent_path().parent_path());
+  sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kShared);
+  if (!workers.take(kTaskPatience_s)) {
+    throw std::runtime_error(folder.root().string() + ": a local sweep is at work here");
+  }
+  const sim::RunOrder order = batch.runs[arguments.index];
+  if (folder.summary(order.id)) return 0;
+  sim::Supervisor supervisor(folder, kSelf, {1, batch.timeout_s, batch.retries},
+                             {[](const auto& broken, const auto& state) {
+                                std::fprintf(stderr, "%s: %s\n", broken.id.c_str(),
+                                             state.detail.c_str());
+                              },
+                              {}});
+  const sim::SweepEnd end = supervisor.fly({order});
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
+  if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
+  return supervisor.progress().broken == 0 ? 0 : 1;
+}
+
+}  // namespace arex::app

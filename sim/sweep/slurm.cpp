@@ -1,0 +1,215 @@
+#include "sweep/slurm.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "run/trajectory_hash.h"
+#include "sweep/child_process.h"
+#include "sweep/file_io.h"
+
+namespace arex::sim {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kDefaultMaxArraySize = 1001;  // Slurm's own default
+constexpr double kPatience_s = 120;                 // with a controller that does not answer
+constexpr int kNotFound = 127;                      // as in a shell
+constexpr int kTimeMargin_min = 2;                  // to start, to write, to be scheduled out
+
+/// What a command of Slurm answers. @throws SlurmError if it fails.
+std::string ask(const std::string& program, const std::vector<std::string>& arguments,
+                const fs::path& folder) {
+  ChildProcess process(program, arguments, folder);
+  const auto exit = process.wait(kPatience_s);
+  if (!exit) throw SlurmError(program + " does not answer");
+  if (exit->exit_code == kNotFound) {
+    throw SlurmError(program + ": not found, expected Slurm's commands in PATH");
+  }
+  if (exit->exit_code != 0) {
+    std::string said = exit->output.empty() ? program + " failed" : exit->output;
+    while (!said.empty() && said.back() == '\n') said.pop_back();
+    std::replace(said.begin(), said.end(), '\n', ' ');
+    throw SlurmError(said);
+  }
+  return exit->output;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
+std::vector<fs::path> batch_files(const SweepFolder& folder) {
+  std::vector<fs::path> files;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder.root() / "slurm", none)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// One name, one batch of one folder: that is how it is found again in the queue.
+std::string batch_name(const SweepFolder& folder, const std::string& sweep, std::size_t number) {
+  TrajectoryHash hash;
+  const std::string root = folder.root().string();
+  hash.add_bytes(std::span<const char>(root));
+  std::string name =
+      "arex-" + sweep + "-" + hash.text().substr(0, 8) + "-" + std::to_string(number);
+  for (char& c : name) {
+    const bool plain =
+        std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';
+    if (!plain) c = '_';
+  }
+  return name;
+}
+
+std::string shell_quoted(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+// Jobs wait in the queue while people build: they fly what was submitted.
+fs::path keep_program(const SweepFolder& folder, const SweepPlan& plan, const fs::path& program) {
+  const fs::path kept = folder.root() / "bin" / ("arex-" + plan.build);
+  if (fs::exists(kept)) return kept;
+  fs::create_directories(kept.parent_path());
+  fs::path partial = kept;
+  partial += ".partial";
+  fs::copy_file(program, partial, fs::copy_options::overwrite_existing);
+  fs::permissions(partial, fs::perms(0755));
+  fs::rename(partial, kept);
+  return kept;
+}
+
+void write_batch(const SweepFolder& folder, const std::string& name, const SweepPlan& plan,
+                 const std::vector<RunOrder>& runs, const fs::path& program) {
+  ordered_json list = ordered_json::array();
+  for (const RunOrder& run : runs) list.push_back({{"id", run.id}, {"scenario", run.scenario}});
+  const ordered_json batch{
+      {"timeout_s", plan.timeout_s}, {"retries", plan.retries}, {"runs", list}};
+  const fs::path file = folder.root() / "slurm" / (name + ".json");
+  write_atomically(folder.root() / "slurm" / (name + ".sh"),
+                   "#!/bin/sh\nexec " + shell_quoted(program.string()) + " sweep-task " +
+                       shell_quoted(file.string()) + " \"$SLURM_ARRAY_TASK_ID\"\n");
+  write_atomically(file, batch.dump(2) + "\n");
+}
+
+std::vector<std::string> sbatch_arguments(const SweepFolder& folder, const SweepPlan& plan,
+                                          const std::string& name, std::size_t runs, int at_a_time,
+                                          const std::vector<std::string>& options) {
+  const int minutes =
+      kTimeMargin_min + static_cast<int>(std::ceil(plan.timeout_s * (plan.retries + 1) / 60));
+  std::string array = "--array=0-" + std::to_string(runs - 1);
+  if (at_a_time > 0) array += "%" + std::to_string(at_a_time);
+  std::vector<std::string> arguments{"--parsable",
+                                     "--ntasks=1",
+                                     "--cpus-per-task=1",
+                                     "--time=" + std::to_string(minutes),
+                                     "--requeue",
+                                     "--open-mode=append",
+                                     "--chdir=" + folder.root().string(),
+                                     "--output=slurm/" + name + "-%a.log"};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  arguments.insert(arguments.end(), {array, "--job-name=" + name, "slurm/" + name + ".sh"});
+  return arguments;
+}
+
+// JOB or JOB;CLUSTER, after any warnings.
+std::string job_id_of(const std::string& answer) {
+  std::string found = "?";
+  for (const std::string& line : lines_of(answer)) {
+    const std::string id = line.substr(0, line.find(';'));
+    if (is_number(id)) found = id;
+  }
+  return found;
+}
+
+}  // namespace
+
+BatchFile load_batch(const fs::path& file) {
+  const ordered_json json = ordered_json::parse(read_file(file), nullptr, false);
+  if (!json.is_object() || !json.contains("runs")) {
+    throw ConfigError(file.string() +
+                      ":1: is not a batch, expected one that 'arex sweep --slurm' " +
+                      "has written");
+  }
+  BatchFile batch{json.value("timeout_s", 0.0), json.value("retries", 0), {}};
+  for (const auto& run : json["runs"]) {
+    batch.runs.push_back({run.value("id", ""), run.value("scenario", "")});
+  }
+  return batch;
+}
+
+std::set<std::string> queued_runs(const SweepFolder& folder) {
+  const std::vector<fs::path> files = batch_files(folder);
+  if (files.empty()) return {};
+  std::map<std::string, BatchFile> batches;
+  std::string names;
+  for (const fs::path& file : files) {
+    batches.emplace(file.stem().string(), load_batch(file));
+    names += (names.empty() ? "" : ",") + file.stem().string();
+  }
+  // Waiting and running tasks, a line each: name and index.
+  const std::string answer =
+      ask("squeue", {"--noheader", "--array", "--name=" + names, "--format=%j %K"}, folder.root());
+  std::set<std::string> ids;
+  for (const std::string& line : lines_of(answer)) {
+    const auto space = line.rfind(' ');
+    if (space == std::string::npos || !is_number(line.substr(space + 1))) continue;
+    const auto batch = batches.find(line.substr(0, space));
+    const std::size_t index = std::stoul(line.substr(space + 1));
+    if (batch == batches.end() || index >= batch->second.runs.size()) continue;
+    ids.insert(batch->second.runs[index].id);
+  }
+  return ids;
+}
+
+std::size_t max_array_size(const SweepFolder& folder) {
+  for (const std::string& line : lines_of(ask("scontrol", {"show", "config"}, folder.root()))) {
+    if (!line.starts_with("MaxArraySize")) continue;
+    const auto digits = line.find_first_of("0123456789");
+    if (digits != std::string::npos)
+      return std::max<std::size_t>(1, std::stoul(line.substr(digits)));
+  }
+  return kDefaultMaxArraySize;
+}
+
+std::vector<SlurmBatch> submit(const SweepFolder& folder, const SweepPlan& plan,
+                               const std::vector<RunOrder>& orders, const fs::path& program,
+                               int at_a_time, const std::vector<std::string>& options) {
+  std::vector<SlurmBatch> batches;
+  if (orders.empty()) return batches;
+  const std::size_t longest = max_array_size(folder);
+  fs::create_directories(folder.root() / "slurm");
+  const fs::path kept = keep_program(folder, plan, program);
+  std::size_t number = batch_files(folder).size();
+  for (std::size_t begin = 0; begin < orders.size(); begin += longest) {
+    const std::size_t end = std::min(orders.size(), begin + longest);
+    const std::vector<RunOrder> runs(orders.begin() + static_cast<std::ptrdiff_t>(begin),
+                                     orders.begin() + static_cast<std::ptrdiff_t>(end));
+    std::string name;
+    do {
+      name = batch_name(folder, plan.name, ++number);
+    } while (fs::exists(folder.root() / "slurm" / (name + ".json")));
+    write_batch(folder, name, plan, runs, kept);
+    const auto arguments = sbatch_arguments(folder, plan, name, runs.size(), at_a_time, options);
+    batches.push_back({name, job_id_of(ask("sbatch", arguments, folder.root())), runs.size()});
+  }
+  return batches;
+}
+
+}  // namespace arex::sim

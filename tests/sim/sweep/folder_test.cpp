@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "run/summary.h"
+#include "support/temporary_folder.h"
+#include "sweep/file_io.h"
+#include "sweep/sweep_table.h"
+
+namespace arex::sim {
+namespace {
+
+using nlohmann::ordered_json;
+using test::read_text;
+using test::TemporaryFolder;
+using test::write_text;
+
+TEST(FileLock, KeepsTwoOutAndEndsWithItsHolder) {
+  const TemporaryFolder folder;
+  {
+    FileLock first(folder / "lock", FileLock::Mode::kExclusive);
+    ASSERT_TRUE(first.take());
+    first.sign("the first");
+    FileLock second(folder / "lock", FileLock::Mode::kExclusive);
+    EXPECT_FALSE(second.take());
+    EXPECT_EQ(second.holder(), "the first");
+    FileLock reader(folder / "lock", FileLock::Mode::kShared);
+    EXPECT_FALSE(reader.take());
+  }
+  FileLock one(folder / "lock", FileLock::Mode::kShared);
+  FileLock two(folder / "lock", FileLock::Mode::kShared);
+  EXPECT_TRUE(one.take());
+  EXPECT_TRUE(two.take());
+  FileLock third(folder / "lock", FileLock::Mode::kExclusive);
+  EXPECT_FALSE(third.take());
+}
+
+TEST(FileIo, AFileIsReplacedWholeOrLeftAlone) {
+  const TemporaryFolder folder;
+  write_atomically(folder / "a", "old");
+  write_atomically(folder / "a", "new");
+  EXPECT_EQ(read_text(folder / "a"), "new");
+  std::filesystem::create_directory(folder / "b");
+  EXPECT_THROW(write_atomically(folder / "b", "text"), DiskError);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
+}
+
+TEST(Flatten, NamesEveryFieldOnceInItsOrder) {
+  const auto summary = ordered_json::parse(
+      R"({"outcome":"succeeded","seed":3,"coverage":{"area_fraction":0.95,"t90_s":null},
+          "targets":[{"x":1},{"x":2}],"map":null,"ok":true})");
+  const std::vector<std::pair<std::string, std::string>> expected{
+      {"outcome", "succeeded"},
+      {"seed", "3"},
+      {"coverage.area_fraction", "0.95"},
+      {"coverage.t90_s", ""},
+      {"targets.count", "2"},
+      {"map", ""},
+      {"ok", "true"}};
+  EXPECT_EQ(flatten(summary), expected);
+}
+
+/// A folder with a plan of three runs that nobody flew.
+class SweepFolderTest : public ::testing::Test {
+ protected:
+  SweepFolderTest() : folder_(temporary_.path()) {
+    plan_.name = "test";
+    plan_.build = "b";
+    plan_.keys = {"a.b"};
+    for (const char* id : {"one", "two", "three"}) {
+      plan_.runs.push_back({id, "forest", "", {std::string(id) + ", \"x\""}, 1, 1, "seed: 1\n"});
+    }
+    folder_.prepare(plan_);
+  }
+  void leave_partial(const std::string& id, const std::string& summary) {
+    const auto partial = folder_.root() / SweepFolder::partial(id);
+    std::filesystem::create_directories(partial);
+    if (!summary.empty()) write_text(partial / "summary.json", summary);
+  }
+  static std::string summary(const std::string& outcome, const std::string& more = "") {
+    return R"({"outcome":")" + outcome + R"(","scenario":"forest","seed":1,"wall_time_s":5)" +
+           more + R"(,"build":{"version":"1"}})";
+  }
+
+  TemporaryFolder temporary_;
+  SweepFolder folder_;
+  SweepPlan plan_;
+};
+
+TEST_F(SweepFolderTest, OnlyAMissionThatEndedByItselfIsPublished) {
+  for (const std::string text : {"", "{", "[1]", R"({"outcome":"succeeded"})"}) {
+    leave_partial("one", text);
+    EXPECT_FALSE(folder_.publish("one")) << text;
+  }
+  leave_partial("one", summary("interrupted"));
+  EXPECT_FALSE(folder_.publish("one"));
+  EXPECT_FALSE(folder_.summary("one"));
+  leave_partial("one", summary("collided"));
+  EXPECT_TRUE(folder_.publish("one"));
+  ASSERT_TRUE(folder_.summary("one"));
+  EXPECT_EQ((*folder_.summary("one"))["outcome"], "collided");
+  EXPECT_TRUE(folder_.partials().empty());
+}
+
+TEST_F(SweepFolderTest, TheFirstToPublishWins) {
+  leave_partial("one", summary("succeeded"));
+  EXPECT_TRUE(folder_.publish("one"));
+  leave_partial("one", summary("collided"));
+  EXPECT_TRUE(folder_.publish("one"));
+  EXPECT_EQ((*folder_.summary("one"))["outcome"], "succeeded");
+  EXPECT_TRUE(folder_.partials().empty());
+}
+
+TEST_F(SweepFolderTest, AFailureStandsUntilTheRunIsFinished) {
+  EXPECT_EQ(folder_.state("one").failure, Failure::kMissing);
+  leave_partial("one", "");
+  folder_.record_failure("one", {Failure::kOverran, "killed after 3 s"}, 2);
+  EXPECT_EQ(folder_.state("one").failure, Failure::kOverran);
+  EXPECT_EQ(folder_.state("one").detail, "killed after 3 s");
+  leave_partial("one", summary("succeeded"));
+  EXPECT_TRUE(folder_.publish("one"));
+  EXPECT_EQ(folder_.state("one").failure, Failure::kNone);
+  EXPECT_FALSE(std::filesystem::exists(folder_.root() / SweepFolder::failed("one")));
+}
+
+TEST_F(SweepFolderTest, TheTableHasARowForEveryRunAndTheUnionOfTheirFields) {
+  leave_partial("one", summary("succeeded", R"(,"planner":null,"coverage":{"a":1})"));
+  EXPECT_TRUE(folder_.publish("one"));
+  leave_partial("two", summary("stuck", R"(,"planner":{"replans":4,"median_ms":2.5},"map":null)"));
+  EXPECT_TRUE(folder_.publish("two"));
+  const SweepTables tables = sweep_tables(plan_, folder_);
+  EXPECT_EQ(tables.results,
+            "run,scenario,a.b,seed,failure,detail,outcome,planner.replans,map,coverage.a,"
+            "build.version\n"
+            "runs/one,forest,\"one, \"\"x\"\"\",1,,,succeeded,,,1,1\n"
+            "runs/two,forest,\"two, \"\"x\"\"\",1,,,stuck,4,,,1\n"
+            "runs/three,forest,\"three, \"\"x\"\"\",1,missing,,,,,,\n");
+  EXPECT_EQ(tables.host,
+            "run,scenario,a.b,seed,wall_time_s,planner.median_ms\n"
+            "runs/one,forest,\"one, \"\"x\"\"\",1,5,\n"
+            "runs/two,forest,\"two, \"\"x\"\"\",1,5,2.5\n"
+            "runs/three,forest,\"three, \"\"x\"\"\",1,,\n");
+}
+
+}  // namespace
+}  // namespace arex::sim

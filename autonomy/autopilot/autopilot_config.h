@@ -10,7 +10,7 @@ namespace arex {
 struct AhrsConfig {
   double initialisation_s = 2.0;   ///< length of the static window
   double still_gyro_radps = 0.02;  ///< largest standard deviation of a static window
-  double still_accel_mps2 = 0.2;
+  double still_accel_mps2 = 0.4;
   double correction_hz = 50;     ///< covariance and drag updates, on means of the raw samples
   double gyro_noise = 2e-4;      ///< rad/s/sqrt(Hz); twice the sensor's, for vibration
   double gyro_walk = 3e-5;       ///< rad/s^2/sqrt(Hz)

@@ -7,7 +7,7 @@ namespace arex {
 /// What the filter believes of the IMU, and how it starts.
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
-  double gyro_noise_density = 2e-4;         ///< rad/s/sqrt(Hz)
+  double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
   double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
   double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
   double gyro_walk_density = 2e-5;          ///< rad/s^2/sqrt(Hz)
@@ -20,7 +20,8 @@ struct ImuNoiseConfig {
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
     f("gyro_noise_density", gyro_noise_density,
-      "rad/s/sqrt(Hz): twice the white noise of the sensor (reference.md, 4), for aliased "
+      "rad/s/sqrt(Hz): half as much again as the white noise of the sensor (reference.md, 4), for "
+      "aliased "
       "vibration; more lets scans of a small scene tilt a vehicle that stands still");
     f("gyro_scale_noise_density", gyro_scale_noise_density,
       "1/sqrt(Hz), times the rate: errors of scale and alignment");
@@ -107,7 +108,7 @@ struct SurfelMapConfig {
   int capacity = 250000;
   double overlap = 0.1;
   int min_points = 6;
-  double saturation_weight = 100;
+  double saturation_weight = 300;
   double max_thickness_ratio = 0.25;
   double refresh_growth = 1.2;
 

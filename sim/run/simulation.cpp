@@ -301,7 +301,7 @@ FlightResult Simulation::finish() {
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
     // odometry's.
     result.map =
-        score_map(cloud, align_rigid(result.flight.poses), world_, scene_, config_.scoring.map);
+        score_map(cloud, align_map(result.flight.poses), world_, scene_, config_.scoring.map);
   }
   if (coverage_) result.coverage = coverage_->result();
   result.plans = stack_.navigator().machine().plans();

@@ -32,6 +32,10 @@ Pose align_at_start(const std::vector<PosePair>& pairs);
 /// The rigid transform X_WO that minimises the squared position error (Umeyama without scale).
 Pose align_rigid(const std::vector<PosePair>& pairs);
 
+/// What places a map: align_rigid(), unless the flight hardly left its place or kept to one line,
+/// so that its positions tell no rotation; then align_at_start().
+Pose align_map(const std::vector<PosePair>& pairs);
+
 /// RMS of the relative position error over all sub-paths of true length `path_m`.
 /// @param stride every stride-th pose starts a sub-path.
 double relative_error(const std::vector<PosePair>& pairs, double path_m, std::size_t stride = 10);

@@ -49,6 +49,22 @@ TEST(OdometryScore, SeparatesAlignmentAtStartFromTheRigidOne) {
 }
 
 // A scale error of 1 % is 1 cm per metre and 10 cm per ten metres of straight path.
+// What hovers with a centimetre of noise tells no rotation: the fit would turn the map about.
+TEST(OdometryScore, AHoverPlacesTheMapByItsStart) {
+  RandomStream random(5, "hover");
+  std::vector<PosePair> hover(2000);
+  for (PosePair& pair : hover) {
+    pair.X_WB.p = {0, 0, 1.5};
+    pair.X_OB.p = pair.X_WB.p + 0.01 * random.normal3();
+  }
+  hover.front().X_OB = hover.front().X_WB;
+  EXPECT_LT(so3::angle(align_map(hover).R), 1e-12);
+  EXPECT_GT(so3::angle(align_rigid(hover).R), 0.1);
+  const Pose X_WO{so3::Exp({0.02, -0.03, 0.5}), {1, 2, 3}};
+  const Pose placed = align_map(figure_of_eight(X_WO));
+  EXPECT_LT(so3::angle(placed.R.transpose() * X_WO.R), 1e-9);
+}
+
 TEST(OdometryScore, RelativeErrorMeasuresDriftPerPath) {
   std::vector<PosePair> pairs;
   for (int i = 0; i <= 3000; ++i) {

@@ -59,7 +59,8 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   accel_scale_ = start->accel_scale;
   stamp_ = correction_stamp_ = scan->end;
   corrected_position_ = filter_.state().p_OB;
-  stood_at_ = filter_.state().X_OB() * filter_.state().X_BL;
+  // Held so tightly, a wrong mounting would be found far more slowly.
+  if (!config_.estimate_extrinsics) stood_at_ = filter_.state().X_OB() * filter_.state().X_BL;
   status_ = OdometryStatus::kOk;
   for (const LidarScanPtr& standing : standing_scans_) {
     MotionSegment still;

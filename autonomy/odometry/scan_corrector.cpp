@@ -60,7 +60,7 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   stamp_ = correction_stamp_ = scan->end;
   corrected_position_ = filter_.state().p_OB;
   // Held so tightly, a wrong mounting would be found far more slowly.
-  if (!config_.estimate_extrinsics) stood_at_ = filter_.state().X_OB() * filter_.state().X_BL;
+  if (!config_.estimate_extrinsics) stood_at_ = filter_.state().X_OB();
   status_ = OdometryStatus::kOk;
   for (const LidarScanPtr& standing : standing_scans_) {
     MotionSegment still;
@@ -131,18 +131,11 @@ void ScanCorrector::hold_standstill(Stamp until) {
     stood_at_.reset();
     return;
   }
-  // Where the map is and what has not moved is the LiDAR; its mounting may be in doubt.
   using Moved = Eigen::Matrix<double, 9, 1>;
-  const Pose X_OL = x.X_OB() * x.X_BL;
   Moved moved;
-  moved << so3::Log(X_OL.R.transpose() * stood_at_->R), stood_at_->p - X_OL.p, -x.v_OB;
+  moved << so3::Log(x.R_OB.transpose() * stood_at_->R), stood_at_->p - x.p_OB, -x.v_OB;
   Eigen::Matrix<double, 9, kErrorDim> H = Eigen::Matrix<double, 9, kErrorDim>::Zero();
-  H.block<3, 3>(0, kRotation) = x.X_BL.R.transpose();
-  H.block<3, 3>(0, kExtrinsicRotation).setIdentity();
-  H.block<3, 3>(3, kRotation) = -x.R_OB * so3::hat(x.X_BL.p);
-  H.block<3, 3>(3, kPosition).setIdentity();
-  H.block<3, 3>(3, kExtrinsicPosition) = x.R_OB;
-  H.block<3, 3>(6, kVelocity).setIdentity();
+  H.leftCols<9>().setIdentity();
   const Moved variance = Moved::Constant(kDefinedStd * kDefinedStd);
   filter_.correct<9>(moved, H, variance.asDiagonal());
 }

@@ -5,10 +5,27 @@
 
 namespace arex {
 
+double energy_fraction(const ConsumptionConfig& config, double rest_v) {
+  const double knee = config.middle_charge;
+  const double below = 0.5 * (config.empty_v + config.middle_v) * knee;  // V times charge
+  const double all = below + 0.5 * (config.middle_v + config.full_v) * (1 - knee);
+  const double v = std::clamp(rest_v, config.empty_v, config.full_v);
+  if (v <= config.middle_v) {
+    const double charge = knee * (v - config.empty_v) / (config.middle_v - config.empty_v);
+    return 0.5 * (config.empty_v + v) * charge / all;
+  }
+  const double charge = (1 - knee) * (v - config.middle_v) / (config.full_v - config.middle_v);
+  return (below + 0.5 * (config.middle_v + v) * charge) / all;
+}
+
 void ConsumptionModel::add(const BatterySample& sample, double speed_mps, bool flying) {
+  const double current = sample.current_a;
+  if (last_ < 0) {
+    const double rest_v = sample.voltage_v + config_.internal_resistance * current;
+    stored_wh_ = config_.capacity_wh * energy_fraction(config_, rest_v);
+  }
   const double dt = last_ < 0 ? 0.0 : to_seconds(sample.stamp - last_);
   last_ = sample.stamp;
-  const double current = sample.current_a;
   const double power = sample.voltage_v * current + config_.internal_resistance * current * current;
   used_ws_ += power * dt;
   if (!flying) return;

@@ -156,6 +156,10 @@ void Explorer::choose(Decision& decision, const ExplorationSpace& space,
   if (!any || most_m2 < config_.stop.min_area_m2) {
     decision.kind = DecisionKind::kStop;
     decision.stop_reason = any ? StopReason::kLittleLeft : StopReason::kNoCandidates;
+    decision.open_frontier_m2 = 0;
+    for (const Frontier& frontier : find_frontiers(space)) {
+      decision.open_frontier_m2 = std::max(*decision.open_frontier_m2, frontier.unknown_area_m2);
+    }
     return;
   }
   if (config_.revenue.direction_aware) {

@@ -101,7 +101,10 @@ struct Decision {
   CandidateSource source = CandidateSource::kTrees;
   std::vector<Candidate> candidates;  ///< empty where a target is kept or the battery decided
   std::optional<std::size_t> winner;  ///< index into candidates
-  double home_distance_m = 0;         ///< along the known path
+  /// Of a stop for want of candidates: the largest f_I of all frontiers that the exhaustive search
+  /// still reaches, whatever the filters and the blacklist made of them.
+  std::optional<double> open_frontier_m2;
+  double home_distance_m = 0;  ///< along the known path
   EnergyBalance energy;
 };
 

@@ -17,7 +17,12 @@ double thread_seconds() {
 }  // namespace
 
 JobQueue::JobQueue(int threads) {
-  for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { run_worker(); });
+  try {
+    for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { run_worker(); });
+  } catch (...) {
+    stop();  // a host that refuses a thread: those that began wait for work, and must end
+    throw;
+  }
 }
 
 JobQueue::~JobQueue() { stop(); }

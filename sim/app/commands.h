@@ -24,6 +24,7 @@ struct RunArguments {
   std::vector<std::string> requirements;  ///< of the summary: field>=value
   std::string junit;                      ///< JUnit file to write; empty: none
   int threads = 1;
+  bool report = true;  ///< also write report.html
   bool quiet = false;
 };
 int run(const RunArguments& arguments);

@@ -34,6 +34,7 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
   command->add_option("--threads", arguments.threads, "host threads; the result does not change")
       ->check(CLI::Range(1, 64));
+  command->add_flag("!--no-report", arguments.report, "no report.html");
   command->add_flag("--quiet", arguments.quiet, "no progress line");
   command->callback([&] { exit_code = run(arguments); });
 }

@@ -15,10 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 
 void report_run(const fs::path& folder) {
-  const sim::RunRecord run = sim::read_run(folder, sim::kMaxReportPoints);
-  const fs::path file = folder / "report.html";
-  sim::write_page(file, sim::run_report_html(run));
-  std::printf("%s%s\n", file.c_str(), run.summary ? "" : " (unfinished run)");
+  const bool finished = sim::write_run_report(folder);
+  std::printf("%s/report.html%s\n", folder.c_str(), finished ? "" : " (unfinished run)");
 }
 
 void report_comparison(const std::vector<fs::path>& folders, const fs::path& directory,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "app/commands.h"
+#include "report/run_report.h"
 #include "run/recorder.h"
 #include "run/requirement.h"
 #include "run/scenario.h"
@@ -167,6 +168,7 @@ int run(const RunArguments& arguments) {
   const nlohmann::ordered_json summary =
       sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin});
   recorder->write_summary(summary);
+  if (arguments.report) sim::write_run_report(folder);
   if (!arguments.quiet) print_result(result, folder);
   if (!arguments.junit.empty()) {
     write_junit(arguments.junit, sim::junit_xml(summary, requirements));

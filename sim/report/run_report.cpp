@@ -250,4 +250,10 @@ std::string run_report_html(const RunRecord& run) {
       run_payload(run));
 }
 
+bool write_run_report(const std::filesystem::path& folder) {
+  const RunRecord run = read_run(folder, kMaxReportPoints);
+  write_page(folder / "report.html", run_report_html(run));
+  return run.summary.has_value();
+}
+
 }  // namespace arex::sim

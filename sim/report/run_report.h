@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -17,5 +18,9 @@ std::string run_report_html(const RunRecord& run);
 /// What the viewer draws, compact. The fields are those of RunPayload in
 /// scripts/report/src/payload.ts.
 nlohmann::ordered_json run_payload(const RunRecord& run);
+
+/// Reads the run folder and writes its report.html. @return whether the run is a finished one.
+/// @throws std::runtime_error naming what cannot be read or written.
+bool write_run_report(const std::filesystem::path& folder);
 
 }  // namespace arex::sim

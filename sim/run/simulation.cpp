@@ -10,7 +10,7 @@ namespace {
 
 constexpr Stamp kTick = kNanosecondsPerTick;
 constexpr Stamp kStatusPeriod = 5 * kTick;  // 200 Hz: what the autopilot tells, the battery, mocap
-constexpr Stamp kCloudPeriod = 20'000 * kTick;  // the map as a killed run leaves it
+constexpr Stamp kCloudPeriod = 10'000 * kTick;  // the map as a killed run leaves it
 constexpr Stamp kPathPeriod = 100 * kTick;      // 10 Hz: revisits and turns
 constexpr Stamp kCoveragePeriod = 1000 * kTick;
 constexpr Stamp kScoreDue = 1000 * kTick;  // the flight does not wait for what is scored or written
@@ -43,6 +43,17 @@ std::uint64_t hash_of(const DepthImage& image) {
 }
 
 }  // namespace
+
+void ExplorationLog::add(const Decision& decision) {
+  ++decisions;
+  if (decision.kind == DecisionKind::kNewTarget) {
+    ++targets;
+    exhaustive += decision.source != CandidateSource::kTrees;
+  } else if (decision.kind == DecisionKind::kStop) {
+    stop_reason = decision.stop_reason;
+    open_frontier_m2 = decision.open_frontier_m2;
+  }
+}
 
 Simulation::Simulation(const Scenario& scenario, int threads)
     : config_(scenario.config),
@@ -208,6 +219,7 @@ void Simulation::record() {
     }
   }
   for (const Decision& decision : stack_.take_decisions()) {
+    exploration_.add(decision);
     if (recorder_) recorder_->decision(decision);
   }
   if (coverage_ && now_ % kPathPeriod == 0) path_W_.push_back(truth.X_WB.p);
@@ -304,6 +316,7 @@ FlightResult Simulation::finish() {
         score_map(cloud, align_map(result.flight.poses), world_, scene_, config_.scoring.map);
   }
   if (coverage_) result.coverage = coverage_->result();
+  result.exploration = exploration_;
   result.plans = stack_.navigator().machine().plans();
   result.plan_failures = stack_.navigator().machine().failures();
   if (recorder_ && config_.stack.mapping.enabled) {

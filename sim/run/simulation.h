@@ -25,6 +25,17 @@ inline constexpr std::array<std::string_view, 7> kOutcomeNames{
     "flying", "succeeded", "collided", "stuck", "lost", "timed_out", "interrupted"};
 
 /// What a flight amounts to; summary.json comes from it.
+/// What the explorer decided, in sum.
+struct ExplorationLog {
+  int decisions = 0;
+  int targets = 0;     ///< decisions for a new one
+  int exhaustive = 0;  ///< of these from the exhaustive search, because the trees had none
+  StopReason stop_reason = StopReason::kNone;
+  std::optional<double> open_frontier_m2;  ///< see Decision
+
+  void add(const Decision& decision);
+};
+
 struct FlightResult {
   Outcome outcome = Outcome::kFlying;
   std::string reason;
@@ -36,6 +47,7 @@ struct FlightResult {
   FlightScore flight;
   std::optional<MapScore> map;             ///< nothing without a map
   std::optional<CoverageResult> coverage;  ///< of explorations
+  ExplorationLog exploration;
   int plans = 0;
   int plan_failures = 0;
   BatteryState battery;
@@ -118,6 +130,7 @@ class Simulation {
   std::size_t covered_points_ = 0;            ///< of the cloud, already scored
   std::vector<CloudGrowth> cloud_growth_;     ///< in jobs of the cloud's lane
   double area_fraction_ = 0;
+  ExplorationLog exploration_;
   int collisions_ = 0;
   Timers timers_;
 

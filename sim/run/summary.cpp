@@ -80,6 +80,16 @@ ordered_json coverage_json(const std::optional<CoverageResult>& coverage) {
           {"surface_fraction_by_class", classes}};
 }
 
+ordered_json exploration_json(const ExplorationLog& log) {
+  if (log.decisions == 0) return nullptr;
+  return {{"decisions", log.decisions},
+          {"targets", log.targets},
+          {"exhaustive", log.exhaustive},
+          {"stop", kStopReasonNames[static_cast<std::size_t>(log.stop_reason)]},
+          {"open_frontier_m2",
+           log.open_frontier_m2 ? ordered_json(rounded(*log.open_frontier_m2)) : nullptr}};
+}
+
 ordered_json planner_json(const FlightResult& result) {
   if (result.plans == 0) return nullptr;
   for (const TimingRow& row : result.timing) {
@@ -125,6 +135,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   json["distance_m"] = rounded(result.flight.distance_m);
   json["targets"] = targets_json(result);
   json["coverage"] = coverage_json(result.coverage);
+  json["exploration"] = exploration_json(result.exploration);
   json["map"] = map_json(result.map);
   json["odometry"] = odometry_json(scenario, result);
   json["planner"] = planner_json(result);

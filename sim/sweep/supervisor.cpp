@@ -92,10 +92,11 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
 void Supervisor::start(const RunOrder& order, int attempt) {
   folder_.remove_partial(order.id);
   folder_.log("start", order.id, attempt, "");
-  const std::vector<std::string> arguments{
-      "run",    SweepFolder::configuration(order.id), "--name",    order.scenario,
-      "--out",  SweepFolder::partial(order.id),       "--threads", "1",
-      "--quiet"};
+  const std::vector<std::string> arguments{"run",       SweepFolder::configuration(order.id),
+                                           "--name",    order.scenario,
+                                           "--out",     SweepFolder::partial(order.id),
+                                           "--threads", "1",
+                                           "--quiet",   "--no-report"};
   flights_.push_back({&order, attempt, false, ChildProcess(program_, arguments, folder_.root())});
 }
 

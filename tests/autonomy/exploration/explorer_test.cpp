@@ -128,6 +128,7 @@ TEST(Explorer, ExploresRandomMazesToTheEnd) {
                 flight.last.stop_reason == StopReason::kLittleLeft);
     EXPECT_GE(flight.known, 0.99) << "seed " << seed;
     EXPECT_LT(flight.open_area_m2, config.stop.min_area_m2) << "seed " << seed;
+    EXPECT_EQ(flight.last.open_frontier_m2, flight.open_area_m2);
     RecordProperty("flown_m_" + std::to_string(seed), std::to_string(flight.flown_m));
   }
 }
@@ -275,7 +276,7 @@ TEST(Explorer, StopsForTheBatteryByTheKnownWayHome) {
     ConsumptionConfig battery;
     battery.internal_resistance = 0;
     hall.input.energy = ConsumptionModel(battery);
-    hall.input.energy.add({0, 10, 0}, 0, false);
+    hall.input.energy.add({0, battery.full_v, 0}, 0, false);
     hall.input.energy.add({3600 * kNanosecondsPerSecond, 10, (spare - left) / 10}, 0, false);
     const Decision d = Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
     EXPECT_EQ(d.kind == DecisionKind::kStop, left < 0);

@@ -223,13 +223,40 @@ TEST(ConsumptionModel, LearnsPowerBySpeedAndCountsEnergy) {
     model.add({i * kNanosecondsPerSecond / 10, 15.0, fast ? 24.0 : 20.0}, fast ? 1.3 : 0.2, true);
   }
   EXPECT_NEAR(model.used_wh(), (320.0 * 1000 + 388.8 * 1000) / 3600, 1e-6);
-  EXPECT_NEAR(model.left_wh(), config.capacity_wh - model.used_wh(), 1e-9);
+  EXPECT_NEAR(model.left_wh(), config.capacity_wh * energy_fraction(config, 16.0) - model.used_wh(),
+              1e-9);
   // Middles of the classes; the prior (the dearer flight mean) weighs 20 s of 1020 s.
   const double flight = (258.0 * 20 + 320.0 * 1000 + 388.8 * 1000) / 2020;
   EXPECT_NEAR(model.power_w(0.25), (flight * 20 + 320.0 * 1000) / 1020, 1e-6);
   EXPECT_NEAR(model.power_w(1.25), (flight * 20 + 388.8 * 1000) / 1020, 1e-6);
   EXPECT_NEAR(model.power_w(0.75), flight, 1e-6);  // never flown: what flying has cost so far
   EXPECT_NEAR(model.power_w(0.5), (model.power_w(0.25) + model.power_w(0.75)) / 2, 1e-9);
+}
+
+TEST(ConsumptionModel, TheFirstReadingTellsHowFullTheBatteryIs) {
+  const ConsumptionConfig config;
+  const auto rest_v = [&](double charge) {
+    const double knee = config.middle_charge;
+    return charge < knee
+               ? config.empty_v + charge / knee * (config.middle_v - config.empty_v)
+               : config.middle_v + (charge - knee) / (1 - knee) * (config.full_v - config.middle_v);
+  };
+  // The curve's integral, summed.
+  constexpr int kSteps = 100'000;
+  double all = 0;
+  for (int i = 0; i < kSteps; ++i) all += rest_v((i + 0.5) / kSteps);
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    sum += rest_v((i + 0.5) / kSteps);
+    if (i % 10'000 != 9'999) continue;
+    const double v = rest_v((i + 1.0) / kSteps);
+    EXPECT_NEAR(energy_fraction(config, v), sum / all, 1e-6) << v;
+    ConsumptionModel model(config);  // under the load of standing on the ground
+    model.add({0, v - config.internal_resistance * 2, 2}, 0, false);
+    EXPECT_NEAR(model.left_wh(), config.capacity_wh * sum / all, 1e-3);
+  }
+  EXPECT_EQ(energy_fraction(config, 18), 1);
+  EXPECT_EQ(energy_fraction(config, 12), 0);
 }
 
 TEST(ConsumptionModel, StandingTeachesNothingAboutFlying) {
@@ -262,6 +289,7 @@ TEST(StopCriteria, ComesHomeWithTheReserveWhereverItStops) {
   for (const double power : {200.0, 258.0, 320.0, 400.0}) {
     ConsumptionConfig battery;
     ConsumptionModel model(battery);
+    model.add({0, battery.full_v, 0}, 0, false);
     const StopConfig config;
     double distance = 0;
     Stamp now = 0;

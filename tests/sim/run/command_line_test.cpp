@@ -111,12 +111,13 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
     EXPECT_TRUE(summary.contains(key)) << key;
   }
   for (const char* file :
-       {"resolved.yaml", "truth.tum", "estimate.tum", "events.csv", "timing.csv"}) {
+       {"resolved.yaml", "truth.tum", "estimate.tum", "events.csv", "timing.csv", "report.html"}) {
     EXPECT_GT(std::filesystem::file_size(folder / "a" / file), 0u) << file;
   }
   const Result again = run({"run", (folder / "a/resolved.yaml").string(), "--quiet", "--threads",
-                            "2", "--out", (folder / "b").string()});
+                            "2", "--no-report", "--out", (folder / "b").string()});
   EXPECT_EQ(again.exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(folder / "b/report.html"));
   const auto summary_again = nlohmann::json::parse(read_text(folder / "b/summary.json"));
   EXPECT_EQ(summary_again["trajectory_hash"], summary["trajectory_hash"]);
   EXPECT_EQ(summary_again["sensor_hash"], summary["sensor_hash"]);

@@ -1,42 +1,77 @@
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "run/simulation.h"
 
 namespace arex::sim {
 namespace {
 
-FlightResult explore(const std::vector<std::string>& overrides, std::uint64_t seed, int threads) {
+FlightResult fly(const std::string& scenario, std::uint64_t seed, int threads,
+                 const std::vector<std::string>& overrides = {}) {
   Simulation simulation(
-      load_scenario(AREX_SOURCE_DIR "/scenarios/forest_small.yaml", overrides, seed), threads);
+      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, seed), threads);
   while (simulation.tick()) {
   }
   return simulation.finish();
 }
 
-// The whole main job on its own odometry: explore, come home, land.
-TEST(Explore, ASmallForestIsExploredAndTheVehicleComesHome) {
-  const FlightResult result = explore({}, 1, 2);
+// A whole mission on one thread; both tests of a scenario look at the same flight.
+const FlightResult& reference(const std::string& scenario) {
+  static std::map<std::string, FlightResult> flights;
+  auto flight = flights.find(scenario);
+  if (flight == flights.end()) flight = flights.emplace(scenario, fly(scenario, 1, 1)).first;
+  return flight->second;
+}
+
+void expect_explored(const FlightResult& result, double area_fraction, double surface_fraction) {
   EXPECT_EQ(result.outcome, Outcome::kSucceeded) << result.reason;
   EXPECT_EQ(result.collisions, 0);
   ASSERT_TRUE(result.coverage.has_value());
-  EXPECT_GE(result.coverage->area_fraction, 0.97);
-  EXPECT_GE(result.coverage->surface_fraction, 0.85);
+  EXPECT_GE(result.coverage->area_fraction, area_fraction);
+  EXPECT_GE(result.coverage->surface_fraction, surface_fraction);
+  EXPECT_GT(result.battery.state_of_charge, 0.2);  // the reserve is kept
+  EXPECT_GT(result.exploration.targets, 3);
+  // It stopped because nothing larger than the threshold was left that it could reach.
+  EXPECT_NE(result.exploration.stop_reason, StopReason::kBattery);
+  EXPECT_LT(result.exploration.open_frontier_m2.value(), StopConfig{}.min_area_m2);
+}
+
+TEST(Explore, ASmallForestIsExploredAndTheVehicleComesHome) {
+  const FlightResult& result = reference("forest_small");
+  expect_explored(result, 0.97, 0.85);
   ASSERT_FALSE(result.targets.empty());
   EXPECT_LT(result.targets.back().p_O.head<2>().norm(), 0.1);  // home
   EXPECT_LT(result.flight.landing_error_m, 0.5);
-  EXPECT_GT(result.battery.state_of_charge, 0.2);  // the reserve is kept
+}
+
+TEST(Explore, ASmallGarageIsExploredDownItsRamp) {
+  const FlightResult& result = reference("garage_small");
+  expect_explored(result, 0.90, 0.7);
+  EXPECT_LT(result.flight.poses.back().X_OB.p.z(), -8);  // on the floor below
+}
+
+// The explorer reads off the voltage that the battery is not full, and turns back for it.
+TEST(Explore, ComesHomeForTheBatteryWithTheReserve) {
+  const FlightResult result =
+      fly("forest_small", 1, 2, {"physics.battery.initial_state_of_charge=0.28"});
+  EXPECT_EQ(result.outcome, Outcome::kSucceeded) << result.reason;
+  EXPECT_EQ(result.exploration.stop_reason, StopReason::kBattery);
+  EXPECT_LT(result.targets.back().p_O.head<2>().norm(), 0.1);
+  EXPECT_GT(result.battery.state_of_charge, 0.2);
 }
 
 // Every module runs, and what they do depends on their jobs' results: the hash must not depend on
 // the threads that ran them.
 TEST(Explore, IsTheSameForAnyNumberOfThreads) {
-  const std::vector<std::string> short_flight{"mission.max_time_s=20"};
-  const FlightResult reference = explore(short_flight, 2, 1);
-  EXPECT_GT(reference.plans, 0);
-  for (const int threads : {2, 4}) {
-    const FlightResult again = explore(short_flight, 2, threads);
-    EXPECT_EQ(again.trajectory_hash, reference.trajectory_hash) << threads << " threads";
-    EXPECT_EQ(again.sensor_hash, reference.sensor_hash) << threads << " threads";
+  for (const char* scenario : {"forest_small", "garage_small"}) {
+    for (const int threads : {2, 4}) {
+      const FlightResult again = fly(scenario, 1, threads);
+      EXPECT_EQ(again.trajectory_hash, reference(scenario).trajectory_hash)
+          << scenario << ", " << threads << " threads";
+      EXPECT_EQ(again.sensor_hash, reference(scenario).sensor_hash)
+          << scenario << ", " << threads << " threads";
+    }
   }
 }
 

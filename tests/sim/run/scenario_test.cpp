@@ -31,6 +31,19 @@ TEST(Scenario, EveryShippedFileIsValidAndSurvivesItsResolvedForm) {
   }
 }
 
+TEST(Scenario, TheStackIsToldItsBatteryUnlessTheScenarioSaysOtherwise) {
+  const auto believed = [](const std::vector<std::string>& overrides) {
+    return load_scenario(AREX_SOURCE_DIR "/scenarios/forest.yaml", overrides, 1)
+        .config.stack.exploration.explorer.consumption;
+  };
+  EXPECT_NEAR(believed({}).capacity_wh, ConsumptionConfig{}.capacity_wh, 1e-9);
+  EXPECT_NEAR(believed({"physics.battery.capacity_ah=2"}).capacity_wh, 29.6, 1e-9);
+  EXPECT_NEAR(believed({"physics.battery.cells=6"}).full_v, 25.2, 1e-9);
+  EXPECT_EQ(believed({"physics.battery.capacity_ah=2", "exploration.consumption.capacity_wh=50"})
+                .capacity_wh,
+            50);
+}
+
 TEST(Scenario, EveryParameterSaysWhatItMeans) {
   for (const ParameterInfo& p : list_parameters(ScenarioConfig{})) {
     EXPECT_FALSE(p.meaning.empty()) << p.key;

@@ -1,0 +1,92 @@
+#include <gtest/gtest.h>
+#include <pcl/io/pcd_io.h>
+#include <pcl/point_types.h>
+
+#include <thread>
+
+#include "math/random.h"
+#include "report/run_record.h"
+#include "support/process.h"
+
+// A machine may die at any moment of a flight: what was flown until then stays readable, and
+// nothing of it looks finished.
+namespace arex {
+namespace {
+
+using test::TemporaryFolder;
+
+constexpr int kFromStart = 15, kFromFirstCloud = 5;  ///< runs killed a while after that moment
+constexpr double kLatest = 5.0;                      ///< the longest while, s of wall time
+
+// By PCL itself, which a user would take: header and data agree.
+std::size_t points_of(const std::filesystem::path& file) {
+  pcl::PointCloud<pcl::PointXYZ> cloud;
+  EXPECT_EQ(pcl::io::loadPCDFile(file.string(), cloud), 0) << file;
+  return cloud.size();
+}
+
+// Only what a kill may cut: the last line of a text file.
+void expect_readable(const std::filesystem::path& folder) {
+  const sim::RunRecord record = sim::read_run(folder, 1'000'000);
+  EXPECT_FALSE(record.summary);
+  EXPECT_FALSE(record.resolved_yaml.empty());
+  for (std::size_t i = 1; i < record.truth.size(); ++i) {
+    ASSERT_NEAR(record.truth[i].time_s - record.truth[i - 1].time_s, 0.005, 1e-9);
+  }
+  const std::filesystem::path cloud = folder / "cloud.pcd";
+  if (std::filesystem::exists(cloud)) {
+    EXPECT_GT(record.cloud.total, 0u);
+    EXPECT_EQ(points_of(cloud), record.cloud.total);
+  }
+}
+
+struct Remains {
+  double flown_s = 0;
+  std::size_t events = 0;
+  bool cloud = false;
+};
+
+void wait_for(const std::filesystem::path& file) {
+  for (int i = 0; i < 6000 && !std::filesystem::exists(file); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ASSERT_TRUE(std::filesystem::exists(file));
+}
+
+Remains kill_after(double seconds, bool from_first_cloud, std::uint64_t seed) {
+  const TemporaryFolder folder;
+  const std::filesystem::path out = folder / "run";
+  const test::Process process(
+      AREX_BINARY,
+      {"run", AREX_SOURCE_DIR "/scenarios/waypoints.yaml", "--quiet", "--seed",
+       std::to_string(seed), "--set", "depth.rate_hz=1", "--out", out.string()},
+      folder.path());
+  if (from_first_cloud) wait_for(out / "cloud.pcd");
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  process.signal(SIGKILL);
+  EXPECT_EQ(process.wait().exit_code, 128 + SIGKILL);
+  if (!std::filesystem::exists(out / "resolved.yaml")) return {};  // before the flight
+  expect_readable(out);
+  const sim::RunRecord record = sim::read_run(out, 1);
+  return {record.duration_s(), record.events.rows.size(), !record.cloud.points_O.empty()};
+}
+
+TEST(KilledRun, IsUnfinishedAndReadableWheneverItDied) {
+  RandomStream random(11, "killed_run_test");
+  int flying = 0, with_events = 0;
+  for (int i = 0; i < kFromStart + kFromFirstCloud; ++i) {
+    const bool from_first_cloud = i >= kFromStart;
+    const double moment = random.uniform(0, from_first_cloud ? 1 : kLatest);
+    SCOPED_TRACE("run " + std::to_string(i) + " killed after " + std::to_string(moment) + " s");
+    const Remains remains = kill_after(moment, from_first_cloud, static_cast<std::uint64_t>(1 + i));
+    flying += remains.flown_s > 0;
+    with_events += remains.events > 0;
+    EXPECT_TRUE(remains.cloud || !from_first_cloud);
+  }
+  // Otherwise the test has looked at nothing.
+  EXPECT_GE(flying, kFromFirstCloud + 2);
+  EXPECT_GE(with_events, kFromFirstCloud + 2);
+}
+
+}  // namespace
+}  // namespace arex

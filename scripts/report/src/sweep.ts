@@ -25,6 +25,12 @@ function blend(from: string, to: string, share: number): string {
   return `color-mix(in oklab, ${themeColour(to)} ${(100 * share).toFixed(1)}%, ${themeColour(from)})`;
 }
 
+/** What the page's address asks for, #figure=...&across=...&by=..., so that a view can be linked. */
+function fromAddress(name: string, options: string[]): string | undefined {
+  const asked = new URLSearchParams(location.hash.slice(1)).get(name);
+  return asked !== null && options.includes(asked) ? asked : undefined;
+}
+
 /** What is drawn: a figure over one key, and over a second one. */
 class FigureView {
   private figure: string;
@@ -36,12 +42,14 @@ class FigureView {
   constructor(private results: Results, section: HTMLElement) {
     const usual = ['coverage.t95_s', 'coverage.area_fraction', 'sim_time_s', SUCCESS];
     const varying = usual.find((name) => results.figures.includes(name) && this.varies(name));
-    this.figure = varying ?? results.figures[0];
-    this.across = results.factors[0];
-    this.by = results.factors[1] ?? '';
     const { factors, figures } = results;
+    this.figure = fromAddress('figure', figures) ?? varying ?? figures[0];
+    this.across = fromAddress('across', factors) ?? factors[0];
+    this.by = fromAddress('by', ['', ...factors]) ?? factors[1] ?? '';
     const set = (apply: (value: string) => void) => (value: string) => {
       apply(value);
+      const { figure, across, by } = this;
+      history.replaceState(null, '', `#${new URLSearchParams({ figure, across, by })}`);
       this.draw();
     };
     const controls = element('div', { class: 'controls' });

@@ -141,6 +141,12 @@ async function testSweep(browser, width, dark) {
     s.dispatchEvent(new Event('change')); })()`);
   assert.match(await text('.heat tbody tr:nth-child(2) td:nth-of-type(1)'), /^0\.75/);
   assert.match(await text('.heat tbody tr:nth-child(1) td:nth-of-type(1)'), /^1/);
+  // The address names the view, and opens it again.
+  const hash = await page.run('location.hash');
+  assert.match(hash, /figure=succeeded/);
+  const linked = await browser.open(address('sweep') + hash, { width, dark });
+  assert.equal(await linked.run(`document.getElementById('figure').value`), 'succeeded');
+  await linked.close();
 
   // Sorting up, then down; the run that crashed has no time and stays last.
   const column = await page.run(`[...document.querySelectorAll('#run-table th')]

@@ -6,7 +6,7 @@ void cast_frame(const RegisteredScan& scan, double range_m, const VehicleConfig&
                 const CellBox& clip, RayCaster& rays) {
   rays.begin(scan.origin_end_O, clip);
   const double range2 = range_m * range_m;
-  const double body2 = vehicle.radius_m * vehicle.radius_m;
+  const double body2 = vehicle.own_returns_m * vehicle.own_returns_m;
   const Vec3 p_LB_O = scan.p_OB - scan.origin_end_O;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const Vec3 origin = scan.origin_of(i);
@@ -28,7 +28,7 @@ void cast_frame(const RegisteredDepth& depth, const LocalGridConfig& config,
   const PinholeCamera& camera = depth.image->camera;
   const Vec3 origin = depth.X_OC.p;
   rays.begin(origin, clip);
-  const double body2 = vehicle.radius_m * vehicle.radius_m;
+  const double body2 = vehicle.own_returns_m * vehicle.own_returns_m;
   const Vec3 p_OB = depth.X_OC * vehicle.X_BC().inverse().p;
   for (int v = 0; v < camera.height; v += config.depth_hit_stride_px) {
     for (int u = 0; u < camera.width; u += config.depth_hit_stride_px) {

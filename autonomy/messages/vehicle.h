@@ -16,6 +16,9 @@ struct VehicleConfig {
   double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
   double torque_ratio_m = 0.0143;      ///< rotor drag torque per thrust
   double radius_m = 0.305;  ///< of the sphere about B that holds the airframe, propellers included
+  /// Returns nearer to B are the vehicle's own, to the maps: its radius and 3 sigma of the range to
+  /// propellers that the LiDAR sees edge-on (35 mm at 87 degrees of incidence).
+  double own_returns_m = 0.41;
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
   double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
@@ -38,6 +41,7 @@ struct VehicleConfig {
     f("thrust_coefficient", thrust_coefficient, "rotor thrust per squared speed, N/(rad/s)^2");
     f("torque_ratio_m", torque_ratio_m, "rotor drag torque per thrust");
     f("radius_m", radius_m, "sphere about B that holds the airframe");
+    f("own_returns_m", own_returns_m, "returns nearer to B are the vehicle's own, to the maps");
     f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
     f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
     f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, III-A)");
@@ -45,6 +49,7 @@ struct VehicleConfig {
     f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
     f.check(mass_kg > 0, "mass_kg > 0");
     f.check(radius_m > 0, "radius_m > 0");
+    f.check(own_returns_m >= radius_m, "own_returns_m >= radius_m");
     f.check(thrust_coefficient > 0, "thrust_coefficient > 0");
   }
 };

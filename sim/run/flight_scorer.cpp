@@ -1,6 +1,7 @@
 #include "run/flight_scorer.h"
 
 #include <cmath>
+#include <utility>
 
 namespace arex::sim {
 namespace {
@@ -9,8 +10,9 @@ constexpr Stamp kRowPeriod = 50 * kNanosecondsPerTick;  // 20 Hz: flight.csv, cl
 
 }  // namespace
 
-FlightScorer::FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start)
-    : clearance_(scene, airframe), X_WO_(X_WB_start) {}
+FlightScorer::FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start,
+                           ThinBranchMeter thin)
+    : clearance_(scene, airframe), thin_(std::move(thin)), X_WO_(X_WB_start) {}
 
 void FlightScorer::moved(const Truth& before, const Truth& after) {
   distance_m_ += (after.X_WB.p - before.X_WB.p).norm();
@@ -42,6 +44,9 @@ void FlightScorer::sample(const Truth& truth, const Stack& stack, bool flying,
   const bool en_route = state == MissionState::kFly || state == MissionState::kEntry ||
                         state == MissionState::kExplore || state == MissionState::kReturn;
   if (en_route) last_clearance_m_ = clearance_.measure(truth);
+  if (const auto& grid = stack.perception().grid(); en_route && grid && !thin_.empty()) {
+    thin_.observe(truth, odometry.X_OB, grid->view);
+  }
   if (recorder) write_row(truth, X_OB, tracking_error, battery, *recorder);
 }
 
@@ -81,6 +86,7 @@ FlightScore FlightScorer::score(const Truth& truth, const Stack& stack) const {
   score.odometry = score_odometry(poses_);
   score.odometry_lost_s = odometry_lost_s_;
   score.clearance = clearance_.statistics();
+  if (!thin_.empty()) score.thin = thin_.score();
   return score;
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "physics/physics.h"
 #include "run/recorder.h"
 #include "scoring/clearance.h"
 #include "scoring/odometry_error.h"
+#include "scoring/thin_branches.h"
 #include "stack/stack.h"
 
 namespace arex::sim {
@@ -20,12 +22,14 @@ struct FlightScore {
   OdometryScore odometry;
   double odometry_lost_s = 0;
   ClearanceMeter::Statistics clearance;
+  std::optional<ThinBranchScore> thin;  ///< where the world has thin branches
 };
 
 /// Follows a flight with the truth in hand: the place in sim/run where truth meets estimate.
 class FlightScorer {
  public:
-  FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start);
+  FlightScorer(const Scene& scene, const Airframe& airframe, const Pose& X_WB_start,
+               ThinBranchMeter thin);
 
   static constexpr Stamp kPeriod = 5 * kNanosecondsPerTick;  ///< 200 Hz
 
@@ -47,6 +51,7 @@ class FlightScorer {
                  const BatteryState& battery, Recorder& recorder) const;
 
   ClearanceMeter clearance_;
+  ThinBranchMeter thin_;
   double last_clearance_m_ = 0;
   Pose X_WO_;
   std::vector<PosePair> poses_;

@@ -10,6 +10,7 @@
 #include "physics/physics_config.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
+#include "scoring/thin_branches.h"
 #include "sensors/d430.h"
 #include "sensors/imu.h"
 #include "sensors/mid360.h"
@@ -40,12 +41,14 @@ struct ScoringConfig {
   double high_m = 3;
   CoverageConfig coverage;
   MapErrorConfig map;
+  ThinBranchConfig thin;
 
   void fields(auto& f) {
     f("low_m", low_m, "lower edge of the space that counts as reachable, z in O");
     f("high_m", high_m, "upper edge of that space");
     f("coverage", coverage, "coverage of the reachable, visible truth");
     f("map", map, "distance of the map from the true surfaces");
+    f("thin", thin, "thin branches seen in time");
     f.check(low_m < high_m, "low_m < high_m");
   }
 };

@@ -26,6 +26,13 @@ std::vector<worlds::CollisionShape> airframe_without_lidar(const Airframe& airfr
   return shapes;
 }
 
+/// What the planner counts with when it asks how fast it may fly.
+StoppingModel stopping_of(const StackConfig& stack) {
+  const PlanningConfig& planning = stack.planning;
+  return {stack.vehicle.radius_m, planning.local.max_acceleration_mps2,
+          planning.local.reaction_s + planning.replan.planning_latency_s};
+}
+
 std::uint64_t hash_of(const LidarScan& scan) {
   TrajectoryHash hash;
   for (const LidarPoint& point : scan.points) {
@@ -65,7 +72,8 @@ Simulation::Simulation(const Scenario& scenario, int threads)
              airframe_without_lidar(physics_.airframe()), config_.seed),
       autopilot_(config_.autopilot, config_.stack.vehicle),
       previous_truth_(physics_.truth()),
-      scorer_(scene_, physics_.airframe(), physics_.truth().X_WB),
+      scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
+              ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
       jobs_(threads),
       lidar_lane_(jobs_.add_lane("lidar")),
       depth_lane_(jobs_.add_lane("depth")),

@@ -102,6 +102,19 @@ ordered_json planner_json(const FlightResult& result) {
   return nullptr;
 }
 
+ordered_json thin_json(const std::optional<ThinBranchScore>& score) {
+  if (!score) return nullptr;
+  const auto share = [&](int count) {
+    return score->branches == 0
+               ? ordered_json(nullptr)
+               : ordered_json(rounded(static_cast<double>(count) / score->branches));
+  };
+  return {{"branches", score->branches},
+          {"seen_in_time", score->seen_in_time},
+          {"seen_in_time_fraction", share(score->seen_in_time)},
+          {"in_grid_fraction", share(score->in_grid)}};
+}
+
 void flatten_into(const ordered_json& value, const std::string& key,
                   std::vector<std::pair<std::string, std::string>>& fields) {
   if (value.is_object()) {
@@ -143,6 +156,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
                       {"landing_error_m", rounded(result.flight.landing_error_m)}};
   json["clearance"] = {{"min_m", rounded(result.flight.clearance.min_m)},
                        {"p05_m", rounded(result.flight.clearance.p05_m)}};
+  json["thin"] = thin_json(result.flight.thin);
   json["collisions"] = result.collisions;
   json["battery"] = {{"used_wh", rounded(result.battery.used_wh)},
                      {"remaining_fraction", rounded(result.battery.state_of_charge)}};
@@ -163,6 +177,8 @@ ordered_json full_summary() {
   result.map.emplace();
   result.coverage.emplace();
   for (ClassCoverage& c : result.coverage->classes) c.visible = 1;
+  result.flight.thin.emplace();
+  result.flight.thin->branches = 1;
   result.plans = 1;
   result.timing.push_back({kPlannerModule, 1, 0, 0, 0});
   result.renderer = "any";

@@ -14,7 +14,7 @@ namespace arex {
 /// taller than the grid would else be flooded through all its layers.
 struct SearchConfig {
   int level_height_cells = 1;
-  int level_max_expansions = 40'000;
+  int level_max_expansions = 60'000;
   int detour_margin_cells = 20;
   int detour_max_expansions = 4000;
   int max_expansions = 60'000;

@@ -9,6 +9,14 @@ namespace {
 constexpr std::uint8_t kBlocked = GridView::kInflated | GridView::kOccupied;
 constexpr double kPiecesPerCell = 2.0;  ///< first pieces are half a cell long
 
+/// The curve begins and ends at rest in places that somebody else chose, and round numbers lie on
+/// faces of cells: a free place is not left out because its neighbour is blocked.
+bool is_at_end(const UniformBspline& spline, const Vec3& p) {
+  const double near = 2 * kGrazeLength_m;
+  return (p - spline.position(0)).norm() <= near ||
+         (p - spline.position(spline.duration_s())).norm() <= near;
+}
+
 /// One piece of a spline: chord and the most it can bulge.
 bool is_piece_blocked(const GridView& grid, const UniformBspline& spline, double t0, double t1,
                       const Vec3& p0, const Vec3& p1, double acceleration_bound) {
@@ -18,7 +26,7 @@ bool is_piece_blocked(const GridView& grid, const UniformBspline& spline, double
   if (!is_box_blocked(grid, p0.cwiseMin(p1) - widen, p0.cwiseMax(p1) + widen)) return false;
   if (is_blocked(grid, p0) || is_blocked(grid, p1)) return true;
   // A standing end has dt > 0 without length: the sagitta decides there too.
-  if ((p1 - p0).norm() + sagitta < kGrazeLength_m) return true;
+  if ((p1 - p0).norm() + sagitta < kGrazeLength_m) return !is_at_end(spline, p0);
   const double middle = 0.5 * (t0 + t1);
   const Vec3 p_middle = spline.position(middle);
   return is_piece_blocked(grid, spline, t0, middle, p0, p_middle, acceleration_bound) ||

@@ -8,8 +8,9 @@
 
 /// Collision of curves with the grid, without gaps between samples: a piece of the curve is free
 /// when the box around it (its chord, widened by the sagitta that its acceleration allows) touches
-/// only free cells; otherwise it is halved, down to kGrazeLength. Cells outside the grid count as
-/// blocked: nothing is planned where nothing can be seen.
+/// only free cells; otherwise it is halved, down to kGrazeLength: a piece that short and still
+/// undecided is blocked, unless it lies at one of the curve's ends (and they are free). Cells
+/// outside the grid count as blocked: nothing is planned where nothing can be seen.
 namespace arex {
 
 inline constexpr double kGrazeLength_m = 1e-4;  ///< pieces shorter than this are not halved again

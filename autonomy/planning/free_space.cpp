@@ -159,7 +159,7 @@ std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start, double tr
 }
 
 GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double reach_m,
-                                 double true_radius_m) {
+                                 double true_radius_m, double yield_m) {
   cells_.assign(grid.cells, grid.cells + grid.size.cast<std::ptrdiff_t>().prod());
   GridView shrunk = grid;
   shrunk.cells = cells_.data();
@@ -169,7 +169,7 @@ GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double rea
   const double least = true_radius_m / grid.resolution_m + 0.5;  // from centre to centre
   const ClearanceCube cube(grid, centre, radius, static_cast<int>(std::ceil(least)) + 2);
   const double here = cube.clearance(cube.index(Eigen::Vector3i::Zero()));
-  const double kept = std::max(std::min(least, here), here - 1.0);
+  const double kept = std::max(std::min(least, here), here - yield_m / grid.resolution_m);
   for (int i = 0; i < cube.count(); ++i) {
     const Eigen::Vector3i cell = centre + cube.offset(i);
     if (!grid.contains(cell) || cube.clearance(i) < kept) continue;

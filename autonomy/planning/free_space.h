@@ -27,14 +27,14 @@ namespace arex {
 
 /// The grid as a vehicle that is inside the inflation sees it: points seen since it planned, or one
 /// cell of noise, have grown over it, and it flies on from there. Within `reach_m` of it (a cube)
-/// the inflation is shrunk to the clearance that the vehicle has, less one cell for the way that a
+/// the inflation is shrunk to the clearance that the vehicle has, less `yield_m` for the way that a
 /// moving vehicle cannot help going on, and never to less than the true radius or, where it is
 /// nearer to an obstacle already, than it has.
 class ShrunkInflation {
  public:
   /// A copy of the grid; valid until the next call.
   [[nodiscard]] GridView around(const GridView& grid, const Vec3& p, double reach_m,
-                                double true_radius_m);
+                                double true_radius_m, double yield_m);
 
  private:
   std::vector<std::uint8_t> cells_;

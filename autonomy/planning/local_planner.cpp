@@ -20,6 +20,7 @@ constexpr double kRoundings[] = {0.4, 0.25, 0.12, 0.05, 0.02};
 constexpr double kShortcutMargins[] = {0.06, 0.01};
 constexpr double kJoinRoundings[] = {0.25, 0.05};
 constexpr double kJoins[] = {1.2, 0.8, 0.5};  ///< m ahead where a moving start joins a path
+constexpr double kAllClearance = 1e3;         ///< m: the inflation may shrink to the true radius
 constexpr double kAtRest = 1e-3;              ///< m/s, m/s^2
 
 std::vector<Vec3> sample_quintic(const Quintic& motion, double length_m) {
@@ -39,54 +40,6 @@ UniformBspline leading_part(const UniformBspline& spline) {
 
 }  // namespace
 
-std::string_view to_string(PlanStatus status) {
-  switch (status) {
-    case PlanStatus::kOk:
-      return "ok";
-    case PlanStatus::kStartInInflation:
-      return "start_in_inflation";
-    case PlanStatus::kGoalInInflation:
-      return "goal_in_inflation";
-    case PlanStatus::kNoPath:
-      return "no_path";
-    case PlanStatus::kOptimiserFailed:
-      return "optimiser_failed";
-    case PlanStatus::kRefineRejected:
-      return "refine_rejected";
-  }
-  return "unknown";
-}
-
-std::string_view to_string(PlanStage stage) {
-  switch (stage) {
-    case PlanStage::kNone:
-      return "none";
-    case PlanStage::kPrevious:
-      return "previous";
-    case PlanStage::kPolynomial:
-      return "polynomial";
-    case PlanStage::kGuided:
-      return "guided";
-    case PlanStage::kRandom:
-      return "random";
-    case PlanStage::kPathFollowing:
-      return "path_following";
-    case PlanStage::kStopAndFollow:
-      return "stop_and_follow";
-    case PlanStage::kEscape:
-      return "escape";
-  }
-  return "unknown";
-}
-
-MotionLimits LocalPlanner::limits(const PlanRequest& request) const {
-  MotionLimits limits = config_.limits();
-  if (request.max_speed_mps > 0) {
-    limits.max_speed_mps = std::min(limits.max_speed_mps, request.max_speed_mps);
-  }
-  return limits;
-}
-
 bool LocalPlanner::within_limits(const UniformBspline& spline, const MotionState& start,
                                  const MotionLimits& limits) const {
   // A start beyond the limits cannot be undone at once; nothing may go further.
@@ -98,7 +51,7 @@ bool LocalPlanner::within_limits(const UniformBspline& spline, const MotionState
 
 std::vector<Vec3> LocalPlanner::polynomial_path(const PlanRequest& request) const {
   const double distance = (request.goal - request.start.p).norm();
-  const double speed = limits(request).max_speed_mps;
+  const double speed = config_.limits().max_speed_mps;
   const double duration = distance / speed + speed / config_.max_acceleration_mps2;
   return sample_quintic(
       Quintic(request.start, {request.goal, Vec3::Zero(), Vec3::Zero()}, duration), distance);
@@ -173,7 +126,7 @@ std::optional<UniformBspline> LocalPlanner::rebound(const GridView& grid,
                                                     const std::vector<Vec3>& path, double dt,
                                                     double safe_distance_m,
                                                     PlanDiagnostics& diagnostics) {
-  MotionLimits slower = limits(request);
+  MotionLimits slower = config_.limits();
   slower.max_speed_mps *= config_.initial_speed_share;
   UniformBspline spline = time_path(path, request.start, slower, dt);
   Anchors anchors(spline.control_points().size());
@@ -203,7 +156,7 @@ std::optional<UniformBspline> LocalPlanner::refine(const GridView& grid,
                                                    const UniformBspline& spline,
                                                    const PlanRequest& request,
                                                    PlanDiagnostics& diagnostics) {
-  const MotionLimits limit = limits(request);
+  const MotionLimits limit = config_.limits();
   const double ratio =
       std::max({1.0, spline.speed_bound() / limit.max_speed_mps,
                 std::sqrt(spline.acceleration_bound() / limit.max_acceleration_mps2)});
@@ -228,17 +181,15 @@ std::optional<UniformBspline> LocalPlanner::refine(const GridView& grid,
   return refined;
 }
 
-std::optional<UniformBspline> LocalPlanner::time_within_limits(const GridView& grid,
-                                                               const std::vector<Vec3>& path,
-                                                               const MotionState& start,
-                                                               const MotionLimits& limit,
-                                                               const SpeedCap& cap) const {
+std::optional<UniformBspline> LocalPlanner::time_within_limits(
+    const GridView& grid, const std::vector<Vec3>& path, const MotionState& start,
+    const MotionLimits& limit, double knot_span_s, const SpeedCap& cap) const {
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     if (!is_segment_free(grid, path[i], path[i + 1])) return std::nullopt;
   }
   MotionLimits tried = limit;
   for (int k = 0; k < config_.timing_attempts; ++k) {
-    UniformBspline timed = time_path(path, start, tried, config_.timing_knot_span_s, cap);
+    UniformBspline timed = time_path(path, start, tried, knot_span_s, cap);
     const bool within = within_limits(timed, start, limit);
     if (within && !first_collision(grid, timed)) return timed;
     // What is wrong at the start follows from the start's own state: slower does not mend it.
@@ -253,10 +204,11 @@ std::optional<UniformBspline> LocalPlanner::bring_within_limits(const GridView& 
                                                                 const UniformBspline& spline,
                                                                 const PlanRequest& request,
                                                                 PlanDiagnostics& diagnostics) {
-  const MotionLimits limit = limits(request);
+  const MotionLimits limit = config_.limits();
   if (within_limits(spline, request.start, limit)) return spline;
   if (auto refined = refine(grid, spline, request, diagnostics)) return refined;
-  auto timed = time_within_limits(grid, sample_path(spline, kPathSpacing), request.start, limit);
+  auto timed = time_within_limits(grid, sample_path(spline, kPathSpacing), request.start, limit,
+                                  config_.timing_knot_span_s);
   diagnostics.retimed = timed.has_value();
   return timed;
 }
@@ -274,9 +226,11 @@ AstarResult LocalPlanner::guide(const GridView& grid, const Vec3& from, const Ve
     if (result.status == AstarStatus::kFound) break;
   }
   if (result.status == AstarStatus::kFound) {
-    result.path.front() = from;
-    if (result.path.size() == 1) result.path.push_back(goal);
-    result.path.back() = goal;
+    // Start and goal are tied to the centres of their cells: a straight line from elsewhere in the
+    // cell to the next centre may cut a blocked corner.
+    if (result.path.size() == 1) result.path.clear();
+    result.path.insert(result.path.begin(), from);
+    result.path.push_back(goal);
   }
   return result;
 }
@@ -299,11 +253,13 @@ std::vector<Vec3> LocalPlanner::join_path(const MotionState& start, std::span<co
 std::optional<UniformBspline> LocalPlanner::follow_path(const GridView& grid,
                                                         const std::vector<Vec3>& path,
                                                         const MotionState& start,
-                                                        const MotionLimits& limit) const {
+                                                        const MotionLimits& limit,
+                                                        double knot_span_s) const {
   for (const double margin : kShortcutMargins) {
     const std::vector<Vec3> corners = shortcut(grid, path, margin);
     for (const double rounding : kRoundings) {
-      if (auto timed = time_within_limits(grid, round_corners(corners, rounding), start, limit)) {
+      if (auto timed = time_within_limits(grid, round_corners(corners, rounding), start, limit,
+                                          knot_span_s)) {
         return timed;
       }
     }
@@ -320,26 +276,37 @@ std::optional<UniformBspline> LocalPlanner::join_and_follow(const GridView& grid
     const std::vector<Vec3> rounded = round_corners(corners, rounding);
     for (const double reach : kJoins) {
       const auto joined = join_path(start, rounded, reach);
-      if (auto timed = time_within_limits(grid, joined, start, limit)) return timed;
+      if (auto timed = time_within_limits(grid, joined, start, limit, config_.timing_knot_span_s))
+        return timed;
     }
   }
   return std::nullopt;
 }
 
+std::optional<UniformBspline> LocalPlanner::plan_stop(const GridView& grid,
+                                                      const MotionState& state,
+                                                      const MotionLimits& limit,
+                                                      const Vec3& towards) const {
+  if (auto stop = find_stop(grid, state, limit, config_.timing_knot_span_s, towards)) return stop;
+  MotionLimits all = limit;
+  all.max_acceleration_mps2 *= 1.0 + config_.limit_tolerance;
+  const double dt = config_.evasive_knot_span_s;
+  return find_stop(grid, state, all, dt, towards);
+}
+
 std::optional<UniformBspline> LocalPlanner::stop_and_follow(const GridView& grid,
                                                             const PlanRequest& request,
                                                             PlanDiagnostics& diagnostics) {
-  const double dt = config_.timing_knot_span_s;
-  const auto stop = find_stop(grid, request.start, limits(request), dt, request.goal);
+  const auto stop = plan_stop(grid, request.start, config_.limits(), request.goal);
   if (!stop) return std::nullopt;
   const MotionState rest{stop->control_points().back(), Vec3::Zero(), Vec3::Zero()};
   const AstarResult way = guide(grid, rest.p, request.goal, diagnostics);
   if (way.status != AstarStatus::kFound) return std::nullopt;
-  const auto follow = follow_path(grid, way.path, rest, limits(request));
+  const auto follow = follow_path(grid, way.path, rest, config_.limits(), stop->knot_span_s());
   if (!follow) return std::nullopt;
   std::vector<Vec3> q = stop->control_points();  // ends with the three that the next begins with
   q.insert(q.end(), follow->control_points().begin() + 3, follow->control_points().end());
-  UniformBspline whole(std::move(q), dt);
+  UniformBspline whole(std::move(q), stop->knot_span_s());
   if (first_collision(grid, whole)) return std::nullopt;
   return whole;
 }
@@ -347,7 +314,7 @@ std::optional<UniformBspline> LocalPlanner::stop_and_follow(const GridView& grid
 void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request,
                                 PlanResult& result) {
   PlanDiagnostics& diagnostics = result.diagnostics;
-  const MotionLimits limit = limits(request);
+  const MotionLimits limit = config_.limits();
   const double dt =
       config_.knot_span_ratio * config_.control_point_distance_m / limit.max_speed_mps;
   bool found_free = false;
@@ -386,7 +353,8 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
     auto joined = join_and_follow(grid, way.path, request.start, limit);
     if (accept(PlanStage::kPathFollowing, std::move(joined))) return;
     if (accept(PlanStage::kStopAndFollow, stop_and_follow(grid, request, diagnostics))) return;
-  } else if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit))) {
+  } else if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit,
+                                                           config_.timing_knot_span_s))) {
     return;
   }
   for (int i = 0; i < config_.random_starts; ++i) {
@@ -395,17 +363,22 @@ void LocalPlanner::climb_ladder(const GridView& grid, const PlanRequest& request
   result.status = found_free ? PlanStatus::kRefineRejected : PlanStatus::kOptimiserFailed;
 }
 
-void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& request,
-                                       PlanResult& result) {
-  const KnownPrefix prefix = known_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
-  if (prefix.whole) return;
+void LocalPlanner::slow_down(const GridView& grid, const PlanRequest& request, PlanResult& result) {
+  const double slower = request.max_speed_mps > 0 ? request.max_speed_mps : config_.max_speed_mps;
+  KnownPrefix prefix{0, 0, true};
+  if (config_.stop_in_known_space) {
+    prefix = known_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
+  }
+  if (prefix.whole && slower >= config_.max_speed_mps) return;
   const double braking = 0.8 * config_.max_acceleration_mps2;
   const auto cap = [&](double s) {
-    return std::max(config_.unknown_speed_mps,
-                    stoppable_speed(prefix.length_m - s, braking, config_.reaction_s));
+    if (prefix.whole) return slower;
+    return std::min(slower,
+                    std::max(config_.unknown_speed_mps,
+                             stoppable_speed(prefix.length_m - s, braking, config_.reaction_s)));
   };
   std::vector<Vec3> path = sample_path(result.trajectory, kPathSpacing);
-  if (config_.unknown_speed_mps <= 0) {  // the unknown is not entered: come to rest before it
+  if (!prefix.whole && config_.unknown_speed_mps <= 0) {  // not entered: come to rest before it
     double length = 0;
     std::size_t end = 1;
     while (end < path.size() && length < prefix.length_m) {
@@ -415,14 +388,15 @@ void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& 
     path.resize(std::max<std::size_t>(2, end - 1));
     result.goal = path.back();
   }
-  result.diagnostics.slowed = true;
-  if (auto slowed = time_within_limits(grid, path, request.start, limits(request), cap)) {
+  result.diagnostics.slowed = !prefix.whole;
+  if (auto slowed = time_within_limits(grid, path, request.start, config_.limits(),
+                                       config_.timing_knot_span_s, cap)) {
     result.trajectory = *std::move(slowed);
     return;
   }
-  // Too fast already for that: brake as hard as the limits allow.
-  auto stop =
-      find_stop(grid, request.start, limits(request), config_.timing_knot_span_s, request.goal);
+  if (prefix.whole) return;  // it is free all the same
+  // Too fast already for the unknown: brake as hard as the limits allow.
+  auto stop = plan_stop(grid, request.start, config_.limits(), request.goal);
   if (stop) {
     result.trajectory = *std::move(stop);
     result.goal = result.trajectory.control_points().back();
@@ -434,18 +408,30 @@ void LocalPlanner::slow_before_unknown(const GridView& grid, const PlanRequest& 
 }
 
 PlanResult LocalPlanner::plan(const GridView& grid, const PlanRequest& request) {
-  if (!is_blocked(grid, request.start.p)) return plan_from_free(grid, request);
-  if (clearance(grid, request.start.p, config_.true_radius_m) < config_.true_radius_m) {
+  const bool blocked = is_blocked(grid, request.start.p);
+  if (blocked && clearance(grid, request.start.p, config_.true_radius_m) < config_.true_radius_m) {
     PlanResult result;
     result.status = PlanStatus::kStartInInflation;
     result.goal = request.goal;
     return result;
   }
+  PlanResult result = blocked ? plan_through_inflation(grid, request, grid.resolution_m)
+                              : plan_from_free(grid, request);
+  const bool no_spline =
+      result.status == PlanStatus::kOptimiserFailed || result.status == PlanStatus::kRefineRejected;
+  const bool in_need = blocked || request.start.v.norm() > kAtRest;
+  if (!no_spline || !request.may_graze || !in_need) return result;
+  PlanResult grazing = plan_through_inflation(grid, request, kAllClearance);
+  return grazing.ok() ? grazing : result;
+}
+
+PlanResult LocalPlanner::plan_through_inflation(const GridView& grid, const PlanRequest& request,
+                                                double yield_m) {
   const double reach =
       config_.leave_distance_m +
       stopping_distance(request.start.v.norm(), config_.max_acceleration_mps2, 0.0);
-  PlanResult result =
-      plan_from_free(shrunk_.around(grid, request.start.p, reach, config_.true_radius_m), request);
+  PlanResult result = plan_from_free(
+      shrunk_.around(grid, request.start.p, reach, config_.true_radius_m, yield_m), request);
   result.diagnostics.start_inflated = true;
   return result;
 }
@@ -469,7 +455,7 @@ PlanResult LocalPlanner::plan_from_free(const GridView& grid, const PlanRequest&
     result.diagnostics.goal_shifted = true;
   }
   climb_ladder(grid, shifted, result);
-  if (result.ok() && config_.stop_in_known_space) slow_before_unknown(grid, shifted, result);
+  if (result.ok()) slow_down(grid, shifted, result);
   return result;
 }
 

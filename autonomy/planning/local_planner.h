@@ -2,40 +2,17 @@
 
 #include <cstdint>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "mapping/grid_view.h"
 #include "planning/free_space.h"
 #include "planning/grid_astar.h"
 #include "planning/local_planner_config.h"
+#include "planning/plan_status.h"
 #include "planning/spline_cost.h"
 #include "planning/uniform_bspline.h"
 
 namespace arex {
-
-enum class PlanStatus {
-  kOk,
-  kStartInInflation,  ///< plan_escape() leads out
-  kGoalInInflation,   ///< and no free place near it
-  kNoPath,            ///< A* found none within its budget
-  kOptimiserFailed,   ///< there is a path, but no spline of the ladder is free
-  kRefineRejected,    ///< free splines were found, but none within the limits
-};
-[[nodiscard]] std::string_view to_string(PlanStatus status);
-
-/// Which rung of the ladder gave the trajectory.
-enum class PlanStage {
-  kNone,
-  kPrevious,       ///< rebound from the rest of the previous trajectory
-  kPolynomial,     ///< rebound from the minimum-jerk polynomial
-  kGuided,         ///< rebound from the complete A* path
-  kRandom,         ///< rebound from a seeded random polynomial
-  kPathFollowing,  ///< no optimiser: the rounded A* path, timed
-  kStopAndFollow,  ///< brake to rest first, then the same
-  kEscape,
-};
-[[nodiscard]] std::string_view to_string(PlanStage stage);
 
 struct PlanRequest {
   MotionState start;         ///< kept exactly
@@ -43,7 +20,10 @@ struct PlanRequest {
   const UniformBspline* previous = nullptr;
   double previous_time_s = 0;  ///< where on `previous` the start is
   std::uint64_t seed = 0;      ///< of the random polynomials
-  double max_speed_mps = 0;    ///< below the configured one, if positive
+  /// If nothing else leads away from a start that moves or is inside the inflation: through the
+  /// inflation near it, but no nearer to an obstacle than the true radius.
+  bool may_graze = false;
+  double max_speed_mps = 0;  ///< if positive: the path is flown no faster
 };
 
 struct PlanDiagnostics {
@@ -60,7 +40,7 @@ struct PlanDiagnostics {
   bool slowed = false;       ///< for unknown space
   bool braked = false;       ///< too fast for the unknown ahead: it only comes to rest
   bool goal_shifted = false;
-  bool start_inflated = false;  ///< the inflation was shrunk about the start
+  bool start_inflated = false;  ///< the inflation was shrunk about the start: not wholly free
 };
 
 struct [[nodiscard]] PlanResult {
@@ -91,9 +71,18 @@ class LocalPlanner {
   /// along the gradient of clearance.
   PlanResult plan_escape(const GridView& grid, const MotionState& start);
 
+  /// To rest without touching anything, if possible near `towards`: straight on or swerving once
+  /// (find_stop); if that is too late, sooner and with the whole tolerance of the limits.
+  [[nodiscard]] std::optional<UniformBspline> plan_stop(const GridView& grid,
+                                                        const MotionState& state,
+                                                        const MotionLimits& limits,
+                                                        const Vec3& towards) const;
+
   [[nodiscard]] const LocalPlannerConfig& config() const { return config_; }
 
  private:
+  PlanResult plan_through_inflation(const GridView& grid, const PlanRequest& request,
+                                    double yield_m);
   PlanResult plan_from_free(const GridView& grid, const PlanRequest& request);
   [[nodiscard]] std::vector<Vec3> polynomial_path(const PlanRequest& request) const;
   [[nodiscard]] std::vector<Vec3> previous_path(const PlanRequest& request) const;
@@ -114,11 +103,9 @@ class LocalPlanner {
                                                                   const UniformBspline& spline,
                                                                   const PlanRequest& request,
                                                                   PlanDiagnostics& diagnostics);
-  [[nodiscard]] std::optional<UniformBspline> time_within_limits(const GridView& grid,
-                                                                 const std::vector<Vec3>& path,
-                                                                 const MotionState& start,
-                                                                 const MotionLimits& limits,
-                                                                 const SpeedCap& cap = {}) const;
+  [[nodiscard]] std::optional<UniformBspline> time_within_limits(
+      const GridView& grid, const std::vector<Vec3>& path, const MotionState& start,
+      const MotionLimits& limits, double knot_span_s, const SpeedCap& cap = {}) const;
   [[nodiscard]] AstarResult guide(const GridView& grid, const Vec3& from, const Vec3& goal,
                                   PlanDiagnostics& diagnostics);
   [[nodiscard]] static std::vector<Vec3> join_path(const MotionState& start,
@@ -126,7 +113,8 @@ class LocalPlanner {
   [[nodiscard]] std::optional<UniformBspline> follow_path(const GridView& grid,
                                                           const std::vector<Vec3>& path,
                                                           const MotionState& start,
-                                                          const MotionLimits& limits) const;
+                                                          const MotionLimits& limits,
+                                                          double knot_span_s) const;
   [[nodiscard]] std::optional<UniformBspline> join_and_follow(const GridView& grid,
                                                               const std::vector<Vec3>& path,
                                                               const MotionState& start,
@@ -135,9 +123,8 @@ class LocalPlanner {
                                                               const PlanRequest& request,
                                                               PlanDiagnostics& diagnostics);
   void climb_ladder(const GridView& grid, const PlanRequest& request, PlanResult& result);
-  void slow_before_unknown(const GridView& grid, const PlanRequest& request, PlanResult& result);
+  void slow_down(const GridView& grid, const PlanRequest& request, PlanResult& result);
 
-  [[nodiscard]] MotionLimits limits(const PlanRequest& request) const;
   [[nodiscard]] bool within_limits(const UniformBspline& spline, const MotionState& start,
                                    const MotionLimits& limits) const;
 

@@ -38,8 +38,9 @@ struct LocalPlannerConfig {
   double random_amplitude = 0.3;  ///< of the distance
   SearchConfig search;
 
-  double timing_knot_span_s = 0.05;  ///< of path-following splines
-  double timing_jerk_mps3 = 30.0;    ///< build-up of acceleration along a path
+  double timing_knot_span_s = 0.05;   ///< of path-following splines
+  double evasive_knot_span_s = 0.02;  ///< of stops for which that is too slow: half of it is lost
+  double timing_jerk_mps3 = 30.0;     ///< build-up of acceleration along a path
   int timing_attempts = 5;
 
   double true_radius_m = 0.3;  ///< the vehicle's (models/arex/README.md)
@@ -83,6 +84,7 @@ struct LocalPlannerConfig {
     f("random_amplitude", random_amplitude, "sideways reach of those, share of the distance");
     f("search", search, "A* budgets");
     f("timing_knot_span_s", timing_knot_span_s, "of path-following splines");
+    f("evasive_knot_span_s", evasive_knot_span_s, "of stops for which that reacts too late");
     f("timing_jerk_mps3", timing_jerk_mps3, "build-up of acceleration along a path");
     f("timing_attempts", timing_attempts, "tries to time a path, each slower");
     f("true_radius_m", true_radius_m, "of the vehicle: inflation shrinks to it for an escape");
@@ -103,6 +105,7 @@ struct LocalPlannerConfig {
             "feasibility_threshold < feasibility_junction");
     f.check(leave_distance_m >= 0, "leave_distance_m >= 0");
     f.check(timing_knot_span_s > 0, "timing_knot_span_s > 0");
+    f.check(evasive_knot_span_s > 0, "evasive_knot_span_s > 0");
   }
 };
 

@@ -43,6 +43,8 @@ bool is_usable(OdometryStatus status) {
   return status == OdometryStatus::kOk || status == OdometryStatus::kDegenerate;
 }
 
+bool is_weak(OdometryStatus status) { return status == OdometryStatus::kDegenerate; }
+
 UniformBspline hold(const Vec3& p, double knot_span_s) {
   return {std::vector<Vec3>(7, p), knot_span_s};
 }
@@ -214,7 +216,8 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
   const bool settled = current_.reaches_target && left < config_.no_replan_within_m;
   const bool due = flown > config_.replan_after_m && !settled;
   const bool slowed = current_.slowed && current_.time(now) > config_.replan_slowed_after_s;
-  const bool asked = state_ == ReplanState::kReplanTraj;
+  const bool asked =
+      state_ == ReplanState::kReplanTraj || current_.cautious != is_weak(odometry.status);
   if (!collision && !blind && !due && !slowed && !asked) return;
 
   enter(ReplanState::kReplanTraj, now);
@@ -276,6 +279,9 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   const Stamp begin = now + from_seconds(config_.planning_latency_s);
   PlanRequest request;
   request.start = state_at(begin, odometry);
+  const bool cautious = is_weak(odometry.status);
+  if (cautious) request.max_speed_mps = config_.degenerate_speed_mps;
+  request.may_graze = true;
   request.seed = seed_ + static_cast<std::uint64_t>(plans_ + failures_);
   const bool from_rest = request.start.v.norm() < kAtRest_mps;
   if (state_ == ReplanState::kReplanTraj && !from_rest) {
@@ -300,6 +306,7 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   ++plans_;
   tries_ = 0;
   Flight flight{last_plan_.trajectory, begin, begin};
+  flight.cautious = cautious;
   flight.slowed = last_plan_.diagnostics.slowed;
   flight.reaches_target = final_target && !last_plan_.diagnostics.braked;
   if (from_rest) {  // look first, then fly
@@ -370,7 +377,7 @@ void ReplanMachine::stop(const GridView& grid, Stamp now, StuckCause cause) {
   const MotionState start = current_.state(now);
   const Vec3 towards = target_.value_or(start.p);
   const double dt = planner.timing_knot_span_s;
-  auto free = find_stop(grid, start, planner.limits(), dt, towards);
+  auto free = planner_.plan_stop(grid, start, planner.limits(), towards);
   Flight flight{free ? *std::move(free) : widest_stop(grid, start, planner.limits(), dt), now, now};
   flight.recovery = true;
   adopt(std::move(flight));

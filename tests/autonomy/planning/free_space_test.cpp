@@ -86,7 +86,7 @@ TEST(FreeSpace, InflationShrinksToTheRoomThereIs) {
     const Vec3 p = test::random_point(random, 0.5, 2.5);
     const GridView before = grid.view();
     ShrunkInflation shrunk;
-    const GridView after = shrunk.around(before, p, kReach, kTrueRadius);
+    const GridView after = shrunk.around(before, p, kReach, kTrueRadius, before.resolution_m);
     EXPECT_EQ(is_blocked(after, p), (before.at(p) & GridView::kOccupied) != 0);
     const double here = clearance(before, p, 1.0);
     for (int i = 0; i < 40 * 40 * 30; ++i) {

@@ -102,6 +102,34 @@ TEST(ReplanMachine, FliesThroughPillarsContinuously) {
   EXPECT_GE(flights, 6);
 }
 
+TEST(ReplanMachine, FliesSlowlyWhileTheOdometryIsDegenerate) {
+  const test::TestGrid grid(240, 60, 20);
+  const ReplanConfig config;
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {1.05, 3.05, 1.05});
+  const auto fly = [&](double seconds) {
+    for (int i = 0; i < static_cast<int>(seconds / to_seconds(kPeriod)); ++i) {
+      flight.step(grid.view());
+    }
+    return flight.last_.v_OB.norm();
+  };
+  flight.step(grid.view());
+  machine.set_target({22.0, 3.0, 1.0}, {}, flight.now_);
+  EXPECT_GT(fly(3.0), 1.7);
+  flight.odometry_.status = OdometryStatus::kDegenerate;
+  fly(1.0);  // from 2 m/s it takes 0.4 s at the acceleration limit
+  flight.fastest_ = 0;
+  EXPECT_GT(fly(5.0), 0.6);
+  EXPECT_LE(flight.fastest_, 1.05 * config.degenerate_speed_mps);
+  flight.odometry_.status = OdometryStatus::kOk;
+  EXPECT_GT(fly(2.0), 1.6);
+  flight.run(grid.view(), 30);
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+  EXPECT_EQ(flight.count(PlannerEventKind::kEmergencyStop), 0);
+  EXPECT_LT(flight.p_jump_, 1e-3);
+  EXPECT_LT(flight.v_jump_, 1.05 * LocalPlannerConfig().max_acceleration_mps2);
+}
+
 TEST(ReplanMachine, SameStampsGiveTheSameFlight) {
   support::PillarFieldOptions options;
   const support::PillarField field(options, 4, 0);

@@ -4,6 +4,7 @@
 
 #include "autonomy/planning/test_grid.h"
 #include "planning/curve_check.h"
+#include "support/unavoidable.h"
 
 namespace arex {
 namespace {
@@ -54,6 +55,28 @@ TEST(Stopping, TheWidestStopGoesWhereThereIsRoom) {
   EXPECT_FALSE(find_stop(grid.view(), state, kLimits, 0.05, state.p));
   const UniformBspline stop = widest_stop(grid.view(), state, kLimits, 0.05);
   EXPECT_GT(stop.position(stop.duration_s()).y(), state.p.y());
+}
+
+/// A wall of cells from (x, y0) to (x, y1) with its face at 0.1 x m; the vehicle comes from the
+/// left.
+test::TestGrid wall(int x, int y0, int y1) {
+  test::TestGrid grid(80, 80, 8);
+  grid.mark({x, y0, 0}, {x + 2, y1, 7}, GridView::kInflated);
+  return grid;
+}
+
+TEST(Stopping, CollisionIsUnavoidableBeforeAWideWallNearerThanTheBrakingDistance) {
+  const Vec3 v(1.5, 0, 0);
+  for (const double distance : {0.05, 0.15, 0.25, 0.33, 0.40, 0.6}) {
+    const test::TestGrid grid = wall(40, 0, 79);
+    const Vec3 p(4.0 - distance, 4.05, 0.4);
+    const double needed = stopping_distance(1.5, 3.0, 0.0);  // 0.375 m
+    EXPECT_EQ(support::is_collision_unavoidable(grid.view(), p, v, 3.0), distance < needed)
+        << distance;
+  }
+  // Beside a narrow one there is a way: 0.3 m ahead leaves 0.2 s, in which 3 m/s^2 shift by 6 cm.
+  EXPECT_FALSE(support::is_collision_unavoidable(wall(40, 40, 40).view(), {3.7, 4.05, 0.4}, v, 3));
+  EXPECT_TRUE(support::is_collision_unavoidable(wall(40, 30, 50).view(), {3.7, 4.05, 0.4}, v, 3));
 }
 
 TEST(Stopping, KnownPrefixEndsAtTheFirstUnknownCell) {

@@ -1,0 +1,45 @@
+#include "planning/plan_status.h"
+
+namespace arex {
+
+std::string_view to_string(PlanStatus status) {
+  switch (status) {
+    case PlanStatus::kOk:
+      return "ok";
+    case PlanStatus::kStartInInflation:
+      return "start_in_inflation";
+    case PlanStatus::kGoalInInflation:
+      return "goal_in_inflation";
+    case PlanStatus::kNoPath:
+      return "no_path";
+    case PlanStatus::kOptimiserFailed:
+      return "optimiser_failed";
+    case PlanStatus::kRefineRejected:
+      return "refine_rejected";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(PlanStage stage) {
+  switch (stage) {
+    case PlanStage::kNone:
+      return "none";
+    case PlanStage::kPrevious:
+      return "previous";
+    case PlanStage::kPolynomial:
+      return "polynomial";
+    case PlanStage::kGuided:
+      return "guided";
+    case PlanStage::kRandom:
+      return "random";
+    case PlanStage::kPathFollowing:
+      return "path_following";
+    case PlanStage::kStopAndFollow:
+      return "stop_and_follow";
+    case PlanStage::kEscape:
+      return "escape";
+  }
+  return "unknown";
+}
+
+}  // namespace arex

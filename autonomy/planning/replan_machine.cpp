@@ -201,9 +201,11 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
       target_.reset();
       report(PlannerEventKind::kTargetReached, now);
       enter(ReplanState::kWaitTarget, now);
-    } else {
+    } else if (is_blocked(grid, *target_)) {
       give_up(StuckCause::kGoalInInflation, now);
       enter(ReplanState::kWaitTarget, now);
+    } else {  // it was blocked when this was planned: a ghost, or seen better from here
+      enter(ReplanState::kGenNewTraj, now);
     }
     return;
   }

@@ -282,6 +282,27 @@ TEST(ReplanMachine, GivesUpATargetAfterItsTime) {
   EXPECT_EQ(machine.cause(), StuckCause::kTimedOut);
 }
 
+TEST(ReplanMachine, GivesUpABlockedTargetOnlyIfItStillIsBlockedOnArrival) {
+  for (const bool ghost : {false, true}) {
+    test::TestGrid grid(120, 80, 20);
+    const Eigen::Vector3i low(84, 34, 0), high(96, 46, 19);  // about the target
+    grid.mark(low, high, GridView::kInflated);
+    ReplanMachine machine = make_machine();
+    Flight flight(machine, {3.05, 4.05, 1.05});
+    flight.step(grid.view());
+    machine.set_target({9.05, 4.05, 1.05}, {}, flight.now_);
+    while (flight.last_.p_OB.x() < 7.5 && flight.now_ < from_seconds(20)) flight.step(grid.view());
+    if (ghost) {
+      grid.forget(low, high);
+      grid.mark(low, high, GridView::kKnown);
+    }
+    flight.run(grid.view(), 20);
+    EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), ghost);
+    EXPECT_EQ(flight.count(PlannerEventKind::kAskForTarget), !ghost);
+    EXPECT_EQ(machine.cause() == StuckCause::kGoalInInflation, !ghost);
+  }
+}
+
 TEST(ReplanMachine, FollowsAGuideAroundWhatTheGridDoesNotShow) {
   const test::TestGrid grid(300, 300, 30, 0.1, {-15, -15, 0});
   ReplanMachine machine = make_machine();

@@ -106,7 +106,6 @@ struct SurfelMapConfig {
   double finest_edge_m = 0.25;
   int levels = 3;
   int capacity = 250000;
-  double overlap = 0.1;
   int min_points = 6;
   double saturation_weight = 300;
   double max_thickness_ratio = 0.25;
@@ -116,9 +115,6 @@ struct SurfelMapConfig {
     f("finest_edge_m", finest_edge_m, "edge of the finest cells; each level doubles it");
     f("levels", levels, "resolutions");
     f("capacity", capacity, "cells kept per level; the longest unseen make room");
-    f("overlap", overlap,
-      "a cell takes points up to this share of its edge beyond each face; 0 bends planes beside a "
-      "face, garage ATE half as large again");
     f("min_points", min_points, "points that make a surfel");
     f("saturation_weight", saturation_weight,
       "a cell that holds this many points' worth of information at 1 cm noise takes no more");
@@ -128,7 +124,6 @@ struct SurfelMapConfig {
     f.check(finest_edge_m > 0, "finest_edge_m > 0");
     f.check(levels >= 1 && levels <= 4, "1 <= levels <= 4");
     f.check(capacity >= 1000 && capacity <= 4000000, "1000 <= capacity <= 4000000");
-    f.check(overlap >= 0 && overlap < 0.5, "0 <= overlap < 0.5");
     f.check(min_points >= 4, "min_points >= 4");
     f.check(refresh_growth >= 1, "refresh_growth >= 1");
   }
@@ -136,8 +131,8 @@ struct SurfelMapConfig {
 
 /// Matching of one scan.
 struct RegistrationConfig {
-  double scan_voxel_m = 0.2;
-  int max_points = 4000;
+  double scan_voxel_m = 0.1;
+  int max_points = 6000;
   int max_iterations = 4;
   double converged_rad = 1e-4;
   double converged_m = 1e-3;

@@ -7,6 +7,19 @@
 #include "odometry/relocalisation.h"
 
 namespace arex {
+namespace {
+
+std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
+  const double duration = static_cast<double>(scan.end - scan.stamp);
+  std::vector<float> fractions;
+  fractions.reserve(points.size());
+  for (const ScanPoint& point : points) {
+    fractions.push_back(static_cast<float>(scan.points[point.index].offset_ns / duration));
+  }
+  return fractions;
+}
+
+}  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
                              double body_radius_m)
@@ -20,19 +33,24 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   imu_.insert(imu_.end(), job.imu.begin(), job.imu.end());
   gyro_.full_scale_radps = job.gyro_full_scale_radps;
   ScanUpdate update;
+  update.begin = job.scan->stamp;
   update.stamp = job.scan->end;
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
+    update.fractions = std::make_shared<const std::vector<float>>();
   } else {
     const std::vector<ScanPoint> points = register_with_motion(*job.scan, update);
     judge(update);
     std::vector<Vec3f> points_O;
+    std::vector<float> fractions;
     if (update.registration.accepted && status_ != OdometryStatus::kLost) {
       points_O = to_O(points);
+      fractions = fractions_of(*job.scan, points);
       if (confirmations_left_ == 0 && doubtful_in_a_row_ == 0) insert(points, points_O);
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
+    update.fractions = std::make_shared<const std::vector<float>>(std::move(fractions));
   }
   update.correction_stamp = correction_stamp_;
   update.status = status_;

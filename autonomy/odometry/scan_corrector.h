@@ -21,9 +21,11 @@ struct ScanJob {
 };
 
 using PointsPtr = std::shared_ptr<const std::vector<Vec3f>>;
+using FractionsPtr = std::shared_ptr<const std::vector<float>>;
 
 /// What came of one scan. Holds at `stamp`, the scan's end.
 struct ScanUpdate {
+  Stamp begin = 0;  ///< of the scan
   Stamp stamp = 0;
   Stamp correction_stamp = 0;  ///< of the newest scan that corrected the state
   OdometryStatus status = OdometryStatus::kInitialising;
@@ -35,6 +37,7 @@ struct ScanUpdate {
   RegistrationReport registration;
   bool recovered = false;  ///< the pose was found again on the map: it may have jumped
   PointsPtr points_O;      ///< undistorted, in O, m; empty when the state is not to be trusted
+  FractionsPtr fractions;  ///< when each of points_O was fired: 0 the scan's begin, 1 its end
 };
 
 /// The heavy half of the odometry: filter and map. Touches nothing but itself and its job, so that

@@ -45,6 +45,14 @@ Mat3 to_symmetric(const std::array<float, 6>& a) {
 
 }  // namespace
 
+const Mat3 SurfelMap::kR_GO = [] {
+  Mat3 R;
+  R.col(0) = Vec3(1, -1, 0).normalized();
+  R.col(1) = Vec3(1, 1, -2).normalized();
+  R.col(2) = Vec3(1, 1, 1).normalized();
+  return R;
+}();
+
 SurfelMap::SurfelMap(const SurfelMapConfig& config) : config_(config) {
   levels_.resize(static_cast<std::size_t>(config.levels));
   for (int i = 0; i < config.levels; ++i) {
@@ -120,35 +128,30 @@ SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key) {
 void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2) {
   // Level by level and with the slots asked for ahead: the time goes into waiting for memory.
   constexpr std::size_t kAhead = 16;
+  std::vector<Vec3> points_G;
+  points_G.reserve(points_O.size());
+  for (const Vec3f& p_O : points_O) points_G.emplace_back(kR_GO * p_O.cast<double>());
   for (Level& level : levels_) {
     const std::size_t mask = level.slots.size() - 1;
     std::array<std::uint64_t, kAhead> keys{};
     const auto look_ahead = [&](std::size_t i) {
-      keys[i % kAhead] = key_of(points_O[i].cast<double>(), level.inverse_edge);
+      keys[i % kAhead] = key_of(points_G[i], level.inverse_edge);
       __builtin_prefetch(&level.slots[hash_of(keys[i % kAhead]) & mask]);
     };
-    for (std::size_t i = 0; i < std::min(kAhead, points_O.size()); ++i) look_ahead(i);
-    for (std::size_t i = 0; i < points_O.size(); ++i) {
-      const Vec3 p_O = points_O[i].cast<double>();
+    for (std::size_t i = 0; i < std::min(kAhead, points_G.size()); ++i) look_ahead(i);
+    for (std::size_t i = 0; i < points_G.size(); ++i) {
       const float weight = static_cast<float>(kUnitVariance) / variances_m2[i];
-      const Vec3 centre = centre_of(p_O, level.edge_m, level.inverse_edge);
-      add(level, obtain(level, keys[i % kAhead]), centre, p_O, weight);
-      const Vec3 d = p_O - centre;
-      for (int axis = 0; axis < 3; ++axis) {
-        if (std::abs(d[axis]) <= (0.5 - config_.overlap) * level.edge_m) continue;
-        Vec3 beside = centre;
-        beside[axis] += std::copysign(level.edge_m, d[axis]);
-        add(level, obtain(level, key_of(beside, level.inverse_edge)), beside, p_O, weight);
-      }
-      if (i + kAhead < points_O.size()) look_ahead(i + kAhead);
+      const Vec3 centre = centre_of(points_G[i], level.edge_m, level.inverse_edge);
+      add(level, obtain(level, keys[i % kAhead]), points_G[i] - centre, weight);
+      if (i + kAhead < points_G.size()) look_ahead(i + kAhead);
     }
   }
 }
 
-void SurfelMap::add(Level& level, Slot& slot, const Vec3& centre, const Vec3& p_O, float weight) {
+void SurfelMap::add(Level& level, Slot& slot, const Vec3& offset_G, float weight) {
   if (slot.saturated != 0) return;
   Cell& cell = level.cells[slot.cell];
-  const Vec3f d = (p_O - centre).cast<float>();
+  const Vec3f d = offset_G.cast<float>();
   ++cell.count;
   cell.weight += weight;
   for (int i = 0; i < 3; ++i) cell.first[static_cast<std::size_t>(i)] += weight * d[i];
@@ -167,9 +170,10 @@ void SurfelMap::add(Level& level, Slot& slot, const Vec3& centre, const Vec3& p_
 }
 
 void SurfelMap::prefetch(const Vec3& p_O) const {
+  const Vec3 p_G = kR_GO * p_O;
   for (const Level& level : levels_) {
     const std::size_t mask = level.slots.size() - 1;
-    __builtin_prefetch(&level.slots[hash_of(key_of(p_O, level.inverse_edge)) & mask]);
+    __builtin_prefetch(&level.slots[hash_of(key_of(p_G, level.inverse_edge)) & mask]);
   }
 }
 
@@ -215,26 +219,32 @@ void SurfelMap::refresh(const Level& level, const Cell& cell, Surfel& surfel) co
 }
 
 std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
+  const Vec3 p_G = kR_GO * p_O;
   std::optional<SurfelMatch> best;
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     const Level& level = levels_[l];
-    const std::uint32_t index = level.slots[slot_of(level, key_of(p_O, level.inverse_edge))].cell;
+    const std::uint32_t index = level.slots[slot_of(level, key_of(p_G, level.inverse_edge))].cell;
     if (index == kNone) continue;
     const Surfel& surfel = level.surfels[index];
     if (surfel.thickness_m2 < 0) continue;
-    const Vec3 mean = centre_of(p_O, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
-    const Vec3 d = p_O - mean;
+    const Vec3 mean = centre_of(p_G, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
+    const Vec3 d = p_G - mean;
     const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
     if (!best || variance < best->variance_m2) {
       best = SurfelMatch{to_vec3(surfel.normal), mean, variance, static_cast<int>(l)};
     }
+  }
+  if (best) {
+    best->normal = kR_GO.transpose() * best->normal;
+    best->mean = kR_GO.transpose() * best->mean;
   }
   return best;
 }
 
 bool SurfelMap::occupied(const Vec3& p_O) const {
   const Level& level = levels_.back();
-  const std::uint32_t index = level.slots[slot_of(level, key_of(p_O, level.inverse_edge))].cell;
+  const std::uint64_t key = key_of(kR_GO * p_O, level.inverse_edge);
+  const std::uint32_t index = level.slots[slot_of(level, key)].cell;
   return index != kNone && level.surfels[index].thickness_m2 >= 0;
 }
 

@@ -21,9 +21,10 @@ struct SurfelMatch {
 /// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell
 /// into it, and the plane fitted to them (a surfel). A query is answered by the resolution that is
 /// surest of its surface there: a wall by a large cell that averages hundreds of points, a trunk by
-/// the smallest. Cells overlap: were they cut at their faces, the noise that carries points across
-/// a face would bend every plane that runs beside one, the floor first of all. Memory is fixed:
-/// when a level is full the cells longest unseen make room (CLOCK).
+/// the smallest. Cells stand on a corner: were their faces level and upright, the noise that
+/// carries points across a face would cut off one tail of every floor and wall that runs beside
+/// one, over its whole length, and bend it. Memory is fixed: when a level is full the cells longest
+/// unseen make room (CLOCK).
 ///
 /// Source: the moments are those of the normal-distributions transform (Biber and Strasser, 2003),
 /// the doubt of a fitted plane that of a linear regression, CLOCK is Corbato's, 1968.
@@ -45,6 +46,10 @@ class SurfelMap {
   /// Whether some cell of the coarsest level that holds a surfel contains p_O.
   [[nodiscard]] bool occupied(const Vec3& p_O) const;
 
+  /// From O to the axes of the cells: the vertical is the cells' diagonal, so that their faces lie
+  /// 35 degrees from every upright plane, 55 from every level one and 25 from a ramp of 30.
+  static const Mat3 kR_GO;
+
   [[nodiscard]] double edge_m(int level) const {
     return config_.finest_edge_m * static_cast<double>(1 << level);
   }
@@ -65,7 +70,7 @@ class SurfelMap {
  private:
   static constexpr std::uint32_t kNone = 0xffffffffU;
 
-  /// Moments relative to the cell's centre, weights relative to 1 cm of noise. One cache line.
+  /// Moments in G relative to the cell's centre, weights relative to 1 cm of noise. One cache line.
   struct alignas(64) Cell {
     std::uint64_t key = 0;
     std::int32_t count = 0;
@@ -74,7 +79,7 @@ class SurfelMap {
     std::array<float, 3> first{};
     std::array<float, 6> second{};
   };
-  /// The fitted plane. One cache line.
+  /// The fitted plane, in G. One cache line.
   struct alignas(64) Surfel {
     std::array<float, 3> mean{};  ///< relative to the cell's centre
     std::array<float, 3> normal{};
@@ -103,7 +108,7 @@ class SurfelMap {
   Slot& obtain(Level& level, std::uint64_t key);
   static std::uint32_t make_room(Level& level);
   static void erase_slot(Level& level, std::size_t hole);
-  void add(Level& level, Slot& slot, const Vec3& centre, const Vec3& p_O, float weight);
+  void add(Level& level, Slot& slot, const Vec3& offset_G, float weight);
   void refresh(const Level& level, const Cell& cell, Surfel& surfel) const;
 
   SurfelMapConfig config_;

@@ -44,23 +44,25 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   const double share = static_cast<double>(s.spikes) / s.between;
   if (usual_spikes_ < 0) usual_spikes_ = share;
   missing_ = s.missing > config_.missing_share * s.between;
-  spikes_ = share > usual_spikes_ + config_.false_share;
+  const bool spikes = share > usual_spikes_ + config_.false_share;
+  spikes_in_a_row_ = spikes ? spikes_in_a_row_ + 1 : 0;
   // What is false does not become usual.
-  if (!spikes_) usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
-  sound_in_a_row_ = missing_ || spikes_ || refused_ ? 0 : sound_in_a_row_ + 1;
+  if (!spikes) usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
+  sound_in_a_row_ = missing_ || spikes || refused_in_a_row_ > 0 ? 0 : sound_in_a_row_ + 1;
 }
 
 void LidarWatch::add_registration(const RegistrationReport& report) {
   if (report.points == 0) return;
   const double share = static_cast<double>(report.matched) / report.points;
   if (usual_matched_ < 0) usual_matched_ = share;
-  refused_ = share < config_.refused_fraction * usual_matched_;
-  if (!refused_) usual_matched_ += (share - usual_matched_) / config_.memory_scans;
+  const bool refused = share < config_.refused_fraction * usual_matched_;
+  refused_in_a_row_ = refused ? refused_in_a_row_ + 1 : 0;
+  if (!refused) usual_matched_ += (share - usual_matched_) / config_.memory_scans;
 }
 
 LidarWatch::State LidarWatch::newest(Stamp now) const {
   if (now - last_scan_ > from_seconds(config_.silent_after_s)) return State::kSilent;
-  if (spikes_ || refused_) return State::kFalse;
+  if (std::max(spikes_in_a_row_, refused_in_a_row_) >= config_.false_scans) return State::kFalse;
   return missing_ ? State::kMissing : State::kSound;
 }
 

@@ -21,6 +21,7 @@ struct LidarWatchConfig {
   double false_share = 0.05;
   double refused_fraction = 0.75;
   double memory_scans = 20;
+  int false_scans = 2;
   int sound_scans = 3;
 
   void fields(auto& f) {
@@ -40,9 +41,12 @@ struct LidarWatchConfig {
     f("refused_fraction", refused_fraction,
       "less than this share of the usual matched share: returns are false");
     f("memory_scans", memory_scans, "over which the usual shares are averaged");
+    f("false_scans", false_scans,
+      "in a row before returns are called false: a turn among shrubs makes one scan look so");
     f("sound_scans", sound_scans, "in a row before it is called sound again");
     f.check(silent_after_s > 0 && memory_scans >= 1, "silent_after_s > 0, memory_scans >= 1");
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");
+    f.check(false_scans >= 1 && sound_scans >= 1, "false_scans >= 1, sound_scans >= 1");
     f.check(firing_period_s > 0 && lines >= 1, "firing_period_s > 0, lines >= 1");
   }
 };
@@ -78,8 +82,8 @@ class LidarWatch {
   double usual_spikes_ = -1;   ///< share; none yet: -1
   double usual_matched_ = -1;  ///< share of the scan's points; none yet: -1
   bool missing_ = false;       ///< in the newest scan
-  bool spikes_ = false;        ///< in the newest scan
-  bool refused_ = false;       ///< the newest scan
+  int spikes_in_a_row_ = 0;    ///< scans
+  int refused_in_a_row_ = 0;   ///< scans
   int sound_in_a_row_ = 0;
   State state_ = State::kSound;  ///< as told
 };

@@ -56,8 +56,9 @@ void Perception::add_scan(Stamp now, const ScanUpdate& update) {
   scan.stamp = update.stamp;
   scan.p_OB = update.state.p_OB;
   scan.origin_end_O = (update.state.X_OB() * X_BL_).p;
-  scan.origin_begin_O = (pose_at(update.stamp - kNanosecondsPerSecond / 10) * X_BL_).p;
+  scan.origin_begin_O = (pose_at(update.begin) * X_BL_).p;
   scan.points_O = update.points_O;
+  scan.fractions = update.fractions;
   add(now, scan);
 }
 

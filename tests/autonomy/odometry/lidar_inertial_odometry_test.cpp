@@ -184,18 +184,43 @@ TEST(LidarInertialOdometry, TheFastOutputIsAsGoodAsTheScans) {
   EXPECT_LT(worst, worst_error(forest(), run) + 0.01);
 }
 
+/// The raw points that an update's points_O came from, and when each was fired.
+struct Fired {
+  const LidarPoint* raw;
+  double t_s;
+};
+std::vector<Fired> fired(const Recording& r, const ScanUpdate& update) {
+  const LidarScan& scan = **std::find_if(r.scans.begin(), r.scans.end(),
+                                         [&](const auto& s) { return s->end == update.stamp; });
+  std::vector<Fired> out;
+  std::size_t raw = 0;
+  for (const float fraction : *update.fractions) {
+    const double since_s = static_cast<double>(fraction) * to_seconds(scan.end - scan.stamp);
+    while (1e-9 * scan.points[raw].offset_ns < since_s - 1e-7) ++raw;
+    out.push_back({&scan.points[raw], to_seconds(scan.stamp) + since_s});
+  }
+  return out;
+}
+
+// Beside the noise of the points, placed from the true pose at their time, there is the drift of a
+// lap from the start: 2 cm and 1 mrad at 10 m.
 TEST(LidarInertialOdometry, PointsLieOnTheSurfaces) {
   const Flown run = fly(forest());
-  std::vector<double> errors;
+  std::vector<double> errors, least;
   for (const ScanUpdate& u : run.updates) {
+    const std::vector<Fired> shots = fired(forest(), u);
     for (std::size_t i = 0; i < u.points_O->size(); i += 37) {
       errors.push_back(forest().world.distance((*u.points_O)[i].cast<double>()));
+      const Pose X_OL = forest().motion.at(shots[i].t_s).X_OB * mounting();
+      least.push_back(forest().world.distance(X_OL * shots[i].raw->p_L.cast<double>()));
     }
   }
   ASSERT_GT(errors.size(), 1000U);
   std::sort(errors.begin(), errors.end());
-  EXPECT_LT(errors[errors.size() / 2], 0.015);
-  EXPECT_LT(errors[errors.size() * 95 / 100], 0.06);
+  std::sort(least.begin(), least.end());
+  const std::size_t p50 = errors.size() / 2, p95 = errors.size() * 95 / 100;
+  EXPECT_LT(errors[p50], 0.015);
+  EXPECT_LT(errors[p95], least[p95] + 0.03);
 }
 
 TEST(LidarInertialOdometry, HoldsStillOnAStaticVehicle) {
@@ -332,6 +357,31 @@ TEST(LidarInertialOdometry, FindsAMountingThatIsOffByADegree) {
   const Flown run = fly(r, config);
   const Mat3 error = run.updates.back().state.X_BL.R.transpose() * X_BL.R;
   EXPECT_LT(so3::angle(error), 0.2 * 3.14159 / 180);
+}
+
+// From where the LiDAR was when a point was fired, the point lies as far off as it was measured.
+TEST(LidarInertialOdometry, TellsWhenEachPointWasFired) {
+  const Flown run = fly(forest());
+  const auto p_OL = [](double t_s) { return (forest().motion.at(t_s).X_OB * mounting()).p; };
+  double by_time = 0, by_rank = 0;
+  int count = 0;
+  for (const ScanUpdate& u : run.updates) {
+    const auto size = static_cast<double>(u.points_O->size());
+    ASSERT_EQ(u.fractions->size(), u.points_O->size());
+    ASSERT_EQ(u.begin, u.stamp - kFrame);
+    const std::vector<Fired> shots = fired(forest(), u);
+    for (std::size_t i = 0; i < shots.size(); i += 7) {
+      const double measured = shots[i].raw->p_L.norm();
+      const Vec3 p_O = (*u.points_O)[i].cast<double>();
+      const double rank_s = to_seconds(u.begin) + (static_cast<double>(i) + 0.5) / size * 0.1;
+      by_time += std::abs((p_O - p_OL(shots[i].t_s)).norm() - measured);
+      by_rank += std::abs((p_O - p_OL(rank_s)).norm() - measured);
+      ++count;
+    }
+  }
+  ASSERT_GT(count, 10000);
+  EXPECT_LT(by_time / count, 0.01);
+  EXPECT_LT(by_time, by_rank);
 }
 
 TEST(LidarInertialOdometry, AKnownDelayOfTheImuCostsNothing) {

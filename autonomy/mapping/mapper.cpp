@@ -31,7 +31,8 @@ std::shared_ptr<const RayCaster> Mapper::integrate_locally(const RegisteredScan&
   const CellBox& global = global_.box();
   const std::shared_ptr<RayCaster> rays = free_rays();
   cast_frame(scan, range_m_, vehicle_,
-             {local.low.cwiseMin(global.low), local.high.cwiseMax(global.high)}, *rays);
+             {local.low.cwiseMin(global.low), local.high.cwiseMax(global.high)}, *rays,
+             config_.lone_range_m);
   local_.add_frame(*rays, LocalGrid::FrameKind::kLidar, scan.stamp);
   return rays;
 }

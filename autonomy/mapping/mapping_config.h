@@ -40,6 +40,7 @@ struct LocalGridConfig {
   Vec3 size_m{30, 30, 3};
   InflationShape inflation_shape = InflationShape::kCubic;
   double decay_per_s = 0.2;
+  double lone_range_m = 1.5;  ///< a 1 cm twig there has 5 returns per frame on each 30 cm
   double depth_min_m = 0.3;
   double depth_max_m = 5.0;
   int depth_hit_stride_px = 4;
@@ -54,6 +55,8 @@ struct LocalGridConfig {
     f("size_m", size_m, "extent along x, y, z, centred on the vehicle (paper)");
     f("inflation_shape", inflation_shape, "cubic (paper) or spherical");
     f("decay_per_s", decay_per_s, "log-odds per second by which what is not seen is forgotten");
+    f("lone_range_m", lone_range_m,
+      "nearer than this a LiDAR return without another beside it is false");
     f("depth_min_m", depth_min_m, "nearer depth is not used");
     f("depth_max_m", depth_max_m, "farther depth only says what is free (sigma 0.09 m there)");
     f("depth_hit_stride_px", depth_hit_stride_px, "every n-th pixel of every n-th row is a point");
@@ -63,6 +66,7 @@ struct LocalGridConfig {
     f.check(confirm_frames >= 2 && confirm_frames <= 11, "2 <= confirm_frames <= 11");
     f.check(size_m.minCoeff() >= 1 && size_m.maxCoeff() <= 40, "1 <= size_m <= 40");
     f.check(decay_per_s >= 0, "decay_per_s >= 0");
+    f.check(lone_range_m >= 0 && lone_range_m <= 5, "0 <= lone_range_m <= 5");
     f.check(depth_min_m > 0 && depth_min_m < depth_max_m, "0 < depth_min_m < depth_max_m");
     f.check(depth_max_m <= 20, "depth_max_m <= 20");
     f.check(depth_hit_stride_px >= 1, "depth_hit_stride_px >= 1");

@@ -10,7 +10,10 @@
 namespace arex {
 namespace {
 
-constexpr double kRoomLooked_m = 1.0;  ///< clearances beyond this are all alike
+constexpr double kWantedRoom_m =
+    0.6;                          ///< clearances beyond this are all alike: twice the vehicle's
+constexpr double kLook_s = 0.05;  ///< between the places of a stop that are looked at
+constexpr double kHover_s = 1.0;  ///< how long it will stay where the stop ends
 constexpr double kAtRest_mps = 1e-9;
 /// Swerves tried: angle (rad) of the first push from straight back, and how long it lasts (s).
 constexpr double kSwerveAngles[] = {0.35, 0.7, 1.05, 1.4};
@@ -117,20 +120,21 @@ std::optional<UniformBspline> find_stop(const GridView& grid, const MotionState&
 
 UniformBspline widest_stop(const GridView& grid, const MotionState& state,
                            const MotionLimits& limits, double dt) {
-  const auto room = [&](const UniformBspline& stop) {
-    double least = kRoomLooked_m;
-    for (const double share : {0.3, 0.6, 1.0}) {
-      least =
-          std::min(least, clearance(grid, stop.position(share * stop.duration_s()), kRoomLooked_m));
-    }
-    return least;
+  const auto danger = [&](const UniformBspline& stop) {
+    const auto lack = [&](double t) {
+      const double missing = kWantedRoom_m - clearance(grid, stop.position(t), kWantedRoom_m);
+      return missing * missing;
+    };
+    double sum = kHover_s * lack(stop.duration_s());
+    for (double t = 0; t < stop.duration_s(); t += kLook_s) sum += kLook_s * lack(t);
+    return sum;
   };
   UniformBspline best = brake(state, limits, dt);
-  double best_room = room(best);
+  double least = danger(best);
   for_each_swerve(state, limits, dt, [&](UniformBspline stop) {
-    const double found = room(stop);
-    if (found <= best_room) return;
-    best_room = found;
+    const double found = danger(stop);
+    if (found >= least) return;
+    least = found;
     best = std::move(stop);
   });
   return best;

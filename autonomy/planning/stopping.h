@@ -37,8 +37,8 @@ struct KnownPrefix {
                                                       const MotionLimits& limits,
                                                       double knot_span_s, const Vec3& towards);
 
-/// For when nothing is free: the stop, straight or swerving, that keeps the greatest clearance from
-/// occupied cells.
+/// For when nothing is free: the stop, straight or swerving, that lacks least clearance from
+/// occupied cells, squared and summed over its time and the hover at its end.
 [[nodiscard]] UniformBspline widest_stop(const GridView& grid, const MotionState& state,
                                          const MotionLimits& limits, double knot_span_s);
 

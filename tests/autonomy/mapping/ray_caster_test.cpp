@@ -126,6 +126,39 @@ TEST(FrameRays, InterpolatesOriginsCutsAtTheRangeAndLeavesOutTheBody) {
   }
 }
 
+TEST(FrameRays, LeavesOutNearReturnsThatStandAlone) {
+  const VehicleConfig vehicle;
+  RegisteredScan scan;
+  scan.origin_begin_O = Vec3(3, 2, 1.2);
+  scan.origin_end_O = Vec3(3.2, 2, 1.2);
+  scan.p_OB = scan.origin_end_O - vehicle.lidar_position_m;
+  const auto near_the_vehicle = [&](double x, double y, double z) {
+    return Vec3f((scan.p_OB + Vec3(x, y, z)).cast<float>());
+  };
+  auto points = std::make_shared<std::vector<Vec3f>>();
+  points->push_back(near_the_vehicle(0.9, 0.1, 0.05));  // alone: false
+  points->push_back(near_the_vehicle(-0.3, 0.1, 0.0));  // the body's
+  points->push_back(near_the_vehicle(2.5, 0.5, 0.0));   // alone, but far
+  points->push_back(near_the_vehicle(0.3, 0.9, 0.2));   // a twig
+  points->push_back(near_the_vehicle(0.3, 0.9, 0.32));
+  points->push_back(near_the_vehicle(-0.6, -0.2, 0.3));  // alone: false, though the body is near
+  scan.points_O = points;
+  const CellBox everywhere{Cell::Constant(-1000), Cell::Constant(1000)};
+  RayCaster caster(0.1);
+  const auto hits = [&](double lone_range_m) {
+    cast_frame(scan, 20, vehicle, everywhere, caster, lone_range_m);
+    return sets_of(caster, everywhere).hit.size();
+  };
+  EXPECT_EQ(hits(0), 5u);
+  EXPECT_EQ(hits(1.5), 3u);
+  EXPECT_EQ(hits(0.8), 4u);
+  cast_frame(scan, 20, vehicle, everywhere, caster, 1.5);
+  for (const std::size_t i : {2, 3, 4}) {
+    const Cell cell = caster.cell_of((*points)[i].cast<double>());
+    EXPECT_TRUE(sets_of(caster, everywhere).hit.contains({cell.x(), cell.y(), cell.z()})) << i;
+  }
+}
+
 TEST(FrameRays, PutsDepthWhereTheCameraSawIt) {
   const VehicleConfig vehicle;
   LocalGridConfig config;

@@ -57,6 +57,23 @@ TEST(Stopping, TheWidestStopGoesWhereThereIsRoom) {
   EXPECT_GT(stop.position(stop.duration_s()).y(), state.p.y());
 }
 
+// As flown: a false return dead ahead, in an aisle, beside a wall. The way round it on the wall's
+// side ended nearer to the wall than the vehicle's radius.
+TEST(Stopping, TheWidestStopDoesNotFleeFromASpeckIntoAWall) {
+  test::TestGrid grid(60, 60, 20);
+  grid.mark({0, 0, 0}, {59, 59, 19}, GridView::kInflated);
+  grid.mark({0, 19, 0}, {59, 19, 19}, GridView::kOccupied);  // 1.1 m to the right
+  for (const int speck : {30, 31}) {  // left of the vehicle's line and right of it
+    test::TestGrid with = grid;
+    with.mark({26, speck, 10}, {26, speck, 10}, GridView::kOccupied);
+    const MotionState state{{2.0, 3.1, 1.05}, {2.0, -0.03, 0}, Vec3::Zero()};
+    const UniformBspline stop = widest_stop(with.view(), state, kLimits, 0.05);
+    for (double t = 0; t <= stop.duration_s(); t += 0.02) {
+      EXPECT_GE(stop.position(t).y(), 2.5) << t;  // half a metre from the wall's face
+    }
+  }
+}
+
 /// A wall of cells from (x, y0) to (x, y1) with its face at 0.1 x m; the vehicle comes from the
 /// left.
 test::TestGrid wall(int x, int y0, int y1) {

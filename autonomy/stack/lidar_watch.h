@@ -21,7 +21,7 @@ struct LidarWatchConfig {
   double false_share = 0.05;
   double refused_fraction = 0.75;
   double memory_scans = 20;
-  int false_scans = 2;
+  int false_scans = 3;
   int sound_scans = 3;
 
   void fields(auto& f) {
@@ -42,7 +42,7 @@ struct LidarWatchConfig {
       "less than this share of the usual matched share: returns are false");
     f("memory_scans", memory_scans, "over which the usual shares are averaged");
     f("false_scans", false_scans,
-      "in a row before returns are called false: a turn among shrubs makes one scan look so");
+      "in a row before returns are called false: a turn among shrubs makes one or two look so");
     f("sound_scans", sound_scans, "in a row before it is called sound again");
     f.check(silent_after_s > 0 && memory_scans >= 1, "silent_after_s > 0, memory_scans >= 1");
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");

@@ -111,7 +111,7 @@ TEST(LidarWatch, NoticesATenthOfTheReturnsFalse) {
     w.count_from_here();
     for (int i = 0; i < 50; ++i) w.frame({.spikes = 0.1}, matched(1300, 1500));  // not got used to
     for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
-    EXPECT_EQ(w.told(), "1:lidar returns false;52:lidar sound again;");
+    EXPECT_EQ(w.told(), "2:lidar returns false;52:lidar sound again;");
   }
 }
 
@@ -121,24 +121,24 @@ TEST(LidarWatch, NoticesReturnsThatFitNothing) {
   for (int i = 0; i < 50; ++i) w.frame({}, matched(1400, 3500));
   w.frame({}, matched(1300, 1500));
   for (int i = 0; i < 10; ++i) w.frame({}, matched(1300, 1500));
-  EXPECT_EQ(w.told(), "1:lidar returns false;53:lidar sound again;");
+  EXPECT_EQ(w.told(), "2:lidar returns false;53:lidar sound again;");
 }
 
 // Shrubs make a sound scan look false now and then; half a second of false returns is five scans.
-TEST(LidarWatch, OneOddScanIsNotFalseTwoAre) {
+TEST(LidarWatch, TwoOddScansAreNotFalseThreeAre) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Watching w(seed);
     w.count_from_here();
     for (int i = 0; i < 10; ++i) {
-      w.frame({.spikes = i % 2 == 0 ? 0.1 : 0.0}, matched(1400, 1500));
+      w.frame({.spikes = i % 3 < 2 ? 0.1 : 0.0}, matched(1400, 1500));
     }
-    for (int i = 0; i < 10; ++i) w.frame({}, matched(i % 2 == 0 ? 1400 : 3500, 3500));
+    for (int i = 0; i < 10; ++i) w.frame({}, matched(i % 3 > 0 ? 1400 : 3500, 3500));
     EXPECT_EQ(w.told(), "");
     w.count_from_here();
     for (int i = 0; i < 4; ++i) w.frame({}, matched(1400, 1500));
     for (int i = 0; i < 5; ++i) w.frame({.spikes = 0.1}, matched(1400, 1500));
     for (int i = 0; i < 4; ++i) w.frame({}, matched(1400, 1500));
-    EXPECT_EQ(w.told(), "5:lidar returns false;11:lidar sound again;");
+    EXPECT_EQ(w.told(), "6:lidar returns false;11:lidar sound again;");
   }
 }
 

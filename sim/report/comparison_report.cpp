@@ -71,15 +71,15 @@ std::string failures_html(const ResultTable& results, const std::filesystem::pat
       "<tbody>\n";
   for (const auto& [cause, reasons] : causes) {
     for (const auto& [reason, rows] : reasons) {
-      html += "<tr><td class=\"word\">" + escape_html(cause) + "</td><td>" +
-              std::to_string(rows.size()) + "</td><td class=\"text\">" + escape_html(reason) +
+      html += "<tr><td class=\"word\">" + escape_markup(cause) + "</td><td>" +
+              std::to_string(rows.size()) + "</td><td class=\"text\">" + escape_markup(reason) +
               "</td><td class=\"text\">";
       for (std::size_t i = 0; i < std::min(rows.size(), kMaxLinks); ++i) {
         const std::filesystem::path& folder = results.folders[rows[i]];
         const std::string link = link_to(folder, directory);
-        const std::string name = escape_html(folder.filename().string());
+        const std::string name = escape_markup(folder.filename().string());
         html +=
-            link.empty() ? name + " " : "<a href=\"" + escape_html(link) + "\">" + name + "</a> ";
+            link.empty() ? name + " " : "<a href=\"" + escape_markup(link) + "\">" + name + "</a> ";
       }
       if (rows.size() > kMaxLinks) html += "…";
       html += "</td></tr>\n";
@@ -102,7 +102,7 @@ std::string header_html(const ResultTable& results, const std::string& title) {
   for (const auto& [cause, count] : counts) {
     figures.push_back({cause, std::to_string(count), ""});
   }
-  std::string html = "<h1>" + escape_html(title) + "</h1>\n";
+  std::string html = "<h1>" + escape_markup(title) + "</h1>\n";
   std::string varied;
   for (const std::string& key : results.keys) {
     std::set<std::string> values;
@@ -110,7 +110,7 @@ std::string header_html(const ResultTable& results, const std::string& title) {
     if (values.size() < 2) continue;
     varied += (varied.empty() ? "<p>Varied: " : ", ");
     varied +=
-        "<code>" + escape_html(key) + "</code> (" + std::to_string(values.size()) + " values)";
+        "<code>" + escape_markup(key) + "</code> (" + std::to_string(values.size()) + " values)";
   }
   if (!varied.empty()) html += varied + "</p>\n";
   return html + key_figures_html(figures);

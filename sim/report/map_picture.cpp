@@ -137,7 +137,7 @@ std::string polyline(const std::vector<StampedPose>& poses, const char* name) {
 
 std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
   return format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius, name) +
-         "<title>" + escape_html(title) + "</title></circle>\n";
+         "<title>" + escape_markup(title) + "</title></circle>\n";
 }
 
 // Kept candidates of every decision as small dots.

@@ -15,7 +15,7 @@ std::string report_page(const std::string& title, const std::string& main,
                         const nlohmann::ordered_json& payload) {
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-  html += "<title>" + escape_html(title) + "</title>\n";
+  html += "<title>" + escape_markup(title) + "</title>\n";
   html += "<link rel=\"icon\" href=\"data:,\">\n";  // or a browser asks for one
   html.append("<style>\n").append(viewer_style()).append("</style>\n</head>\n<body>\n<main>\n");
   html += main;
@@ -29,8 +29,8 @@ std::string report_page(const std::string& title, const std::string& main,
 std::string key_figures_html(const std::vector<KeyFigure>& figures) {
   std::string html = "<dl class=\"figures\">\n";
   for (const KeyFigure& figure : figures) {
-    html += "<div><dt>" + escape_html(figure.label) + "</dt><dd>" + escape_html(figure.value);
-    if (!figure.note.empty()) html += "<small>" + escape_html(figure.note) + "</small>";
+    html += "<div><dt>" + escape_markup(figure.label) + "</dt><dd>" + escape_markup(figure.value);
+    if (!figure.note.empty()) html += "<small>" + escape_markup(figure.note) + "</small>";
     html += "</dd></div>\n";
   }
   return html + "</dl>\n";

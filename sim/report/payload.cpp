@@ -70,33 +70,6 @@ std::vector<std::uint8_t> deflated(std::span<const std::uint8_t> bytes) {
 nlohmann::ordered_json quantised(std::span<const double> values) { return quantise(values); }
 nlohmann::ordered_json quantised(std::span<const float> values) { return quantise(values); }
 
-std::string escape_html(std::string_view text) {
-  std::string escaped;
-  escaped.reserve(text.size());
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
 std::string json_for_script(const nlohmann::ordered_json& json) {
   // A stray byte that is no UTF-8 (a name from somebody's file system) becomes U+FFFD.
   const std::string text =

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "run/markup.h"
+
 /// How numbers travel inside a report: small, and readable by the viewer without a network.
 namespace arex::sim {
 
@@ -23,9 +25,6 @@ inline constexpr std::uint16_t kMissingLevel = 65535;
 /// Half a step of error at most: 0.8 mm over 100 m.
 nlohmann::ordered_json quantised(std::span<const double> values);
 nlohmann::ordered_json quantised(std::span<const float> values);
-
-/// Text as HTML shows it, in an attribute as well.
-std::string escape_html(std::string_view text);
 
 /// JSON that may stand inside <script>: no '<' appears in it.
 std::string json_for_script(const nlohmann::ordered_json& json);

@@ -90,21 +90,21 @@ std::string header_html(const RunRecord& run) {
   const std::string outcome = run.summary ? summary.text("/outcome") : "unfinished";
   const std::string name = scenario.empty() ? run.folder.filename().string()
                                             : scenario + ", seed " + summary.text("/seed");
-  std::string html = "<h1>" + escape_html(name) + " <span class=\"badge " + escape_html(outcome) +
-                     "\">" + escape_html(outcome) + "</span></h1>\n";
+  std::string html = "<h1>" + escape_markup(name) + " <span class=\"badge " +
+                     escape_markup(outcome) + "\">" + escape_markup(outcome) + "</span></h1>\n";
   if (!run.summary) {
     html +=
         "<p class=\"notice\">This run is unfinished: the folder has no summary.json. "
         "What it recorded until then is shown.</p>\n";
     return html;
   }
-  html += "<p>" + escape_html(summary.text("/reason"));
+  html += "<p>" + escape_markup(summary.text("/reason"));
   const std::string source = summary.text("/odometry/source");
-  if (!source.empty()) html += ". Odometry: " + escape_html(source);
+  if (!source.empty()) html += ". Odometry: " + escape_markup(source);
   const std::string hash = summary.text("/trajectory_hash");
-  if (!hash.empty()) html += ". Trajectory <code>" + escape_html(hash) + "</code>";
+  if (!hash.empty()) html += ". Trajectory <code>" + escape_markup(hash) + "</code>";
   const std::string version = summary.text("/build/version");
-  if (!version.empty()) html += ", build " + escape_html(version);
+  if (!version.empty()) html += ", build " + escape_markup(version);
   html += "</p>\n";
   return html + key_figures_html(key_figures(summary));
 }
@@ -137,9 +137,9 @@ std::string timing_html(const Table& timing) {
       "timing\">\n<thead><tr><th class=\"word\">module</th><th>calls</th><th>median, ms</th>"
       "<th>p99, ms</th><th>total, s</th><th></th></tr></thead>\n<tbody>\n";
   for (std::size_t i = 0; i < timing.rows.size(); ++i) {
-    html += "<tr><td class=\"word\">" + escape_html(timing.text(i, "module")) + "</td>";
+    html += "<tr><td class=\"word\">" + escape_markup(timing.text(i, "module")) + "</td>";
     for (const char* name : {"calls", "median_ms", "p99_ms", "total_s"}) {
-      html += "<td>" + escape_html(timing.text(i, name)) + "</td>";
+      html += "<td>" + escape_markup(timing.text(i, name)) + "</td>";
     }
     const double share = most > 0 && std::isfinite(totals[i]) ? totals[i] / most : 0;
     html += "<td class=\"wide\"><span class=\"bar\" style=\"width:" +
@@ -163,17 +163,17 @@ std::string decisions_html(const Table& decisions) {
     }
     const std::string kind = decisions.text(begin, "kind");
     if (kind == "keep_target" || ++count > kMaxDecisions) continue;
-    const std::string time = escape_html(decisions.text(begin, "time_s"));
+    const std::string time = escape_markup(decisions.text(begin, "time_s"));
     const std::string stop = decisions.text(begin, "stop_reason");
     const bool some = !decisions.text(begin, "candidate").empty();
     rows.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
-    rows.append("</td><td class=\"word\">").append(escape_html(kind));
-    if (kind == "stop") rows.append(": ").append(escape_html(stop));
+    rows.append("</td><td class=\"word\">").append(escape_markup(kind));
+    if (kind == "stop") rows.append(": ").append(escape_markup(stop));
     rows.append("</td><td>").append(some ? std::to_string(end - begin) : "0");
     rows.append("</td><td>").append(std::to_string(kept)).append("</td>");
     for (const char* name : {"information_m2", "distance_m", "angle_rad", "revenue"}) {
       rows += "<td>";
-      if (winner) rows += escape_html(decisions.text(*winner, name));
+      if (winner) rows += escape_markup(decisions.text(*winner, name));
       rows += "</td>";
     }
     rows += "</tr>\n";
@@ -192,16 +192,16 @@ std::string events_html(const Table& events) {
   for (std::size_t i = 0; i < events.rows.size(); ++i) ++kinds[events.text(i, "kind")];
   std::string html = "<section id=\"events\">\n<h2>Events</h2>\n<ul class=\"chips\">";
   for (const auto& [kind, count] : kinds) {
-    html += "<li>" + escape_html(kind) + " " + std::to_string(count) + "</li>";
+    html += "<li>" + escape_markup(kind) + " " + std::to_string(count) + "</li>";
   }
   html +=
       "</ul>\n<div class=\"scroll\"><table class=\"data\">\n<thead><tr><th>time, s</th>"
       "<th class=\"word\">kind</th><th class=\"text\">detail</th></tr></thead>\n<tbody>\n";
   for (std::size_t i = 0; i < std::min(events.rows.size(), kMaxEvents); ++i) {
-    const std::string time = escape_html(events.text(i, "time_s"));
+    const std::string time = escape_markup(events.text(i, "time_s"));
     html.append("<tr data-t=\"").append(time).append("\"><td>").append(time);
-    html.append("</td><td class=\"word\">").append(escape_html(events.text(i, "kind")));
-    html.append("</td><td class=\"text\">").append(escape_html(events.text(i, "detail")));
+    html.append("</td><td class=\"word\">").append(escape_markup(events.text(i, "kind")));
+    html.append("</td><td class=\"text\">").append(escape_markup(events.text(i, "detail")));
     html += "</td></tr>\n";
   }
   html += "</tbody>\n</table></div>\n";
@@ -215,16 +215,16 @@ std::string events_html(const Table& events) {
 std::string details_html(const RunRecord& run) {
   std::string html = "<section>\n<h2>In full</h2>\n";
   if (run.summary) {
-    html += "<details><summary>summary.json</summary><pre>" + escape_html(run.summary->dump(2)) +
+    html += "<details><summary>summary.json</summary><pre>" + escape_markup(run.summary->dump(2)) +
             "</pre></details>\n";
   }
   if (!run.resolved_yaml.empty()) {
-    html += "<details><summary>resolved.yaml</summary><pre>" + escape_html(run.resolved_yaml) +
+    html += "<details><summary>resolved.yaml</summary><pre>" + escape_markup(run.resolved_yaml) +
             "</pre></details>\n";
   }
   if (!run.missing.empty()) {
     html += "<p class=\"note\">Not in the run folder:";
-    for (const std::string& name : run.missing) html += " " + escape_html(name);
+    for (const std::string& name : run.missing) html += " " + escape_markup(name);
     html += "</p>\n";
   }
   return html + "</section>\n";

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "run/markup.h"
 #include "run/summary.h"
 
 namespace arex::sim {
@@ -76,35 +77,12 @@ void check_key(const Requirement& requirement, const std::string& where,
   config_detail::reject_unknown(node, known);
 }
 
-std::string xml_escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-    }
-  }
-  return escaped;
-}
-
 std::string test_case(const std::string& suite, const std::string& name, const std::string& time,
                       const std::string& failure) {
-  std::string text = "    <testcase classname=\"" + xml_escaped(suite) + "\" name=\"" +
-                     xml_escaped(name) + "\" time=\"" + time + "\"";
+  std::string text = "    <testcase classname=\"" + escape_markup(suite) + "\" name=\"" +
+                     escape_markup(name) + "\" time=\"" + time + "\"";
   if (failure.empty()) return text + "/>\n";
-  return text + ">\n      <failure message=\"" + xml_escaped(failure) + "\"/>\n    </testcase>\n";
+  return text + ">\n      <failure message=\"" + escape_markup(failure) + "\"/>\n    </testcase>\n";
 }
 
 }  // namespace
@@ -170,7 +148,7 @@ std::string junit_xml(const ordered_json& summary, const std::vector<Requirement
     add(requirement.text, "0", violation(requirement, summary));
   }
   return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n  <testsuite name=\"" +
-         xml_escaped(suite) + "\" tests=\"" + std::to_string(requirements.size() + 1) +
+         escape_markup(suite) + "\" tests=\"" + std::to_string(requirements.size() + 1) +
          "\" failures=\"" + std::to_string(failures) + "\" errors=\"0\" time=\"" + time + "\">\n" +
          cases + "  </testsuite>\n</testsuites>\n";
 }

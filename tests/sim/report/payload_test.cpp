@@ -69,7 +69,7 @@ TEST(Payload, SmoothColumnsShrink) {
 }
 
 TEST(Payload, HtmlAndScriptsCannotBeLeft) {
-  EXPECT_EQ(escape_html("<b a=\"1\" c='2'>&"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;");
+  EXPECT_EQ(escape_markup("<b a=\"1\" c='2'>&"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;");
   const nlohmann::ordered_json json{{"k", "</script><!-- \xFF"}};
   const std::string script = json_for_script(json);
   EXPECT_EQ(script.find('<'), std::string::npos);

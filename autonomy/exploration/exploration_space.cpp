@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "exploration/line_walk.h"
+#include "mapping/line_walk.h"
 
 namespace arex {
 namespace {
@@ -43,9 +43,10 @@ ExplorationSpace::ExplorationSpace(const OccupancyMap2D& map, const ExplorationB
     : map_(map), bounds_(bounds), config_(config) {
   classify();
   measure_clearance();
+  for (const std::uint32_t cell : map_.flown) flags_[cell] |= kPassable;
   travel_.assign(flags_.size(), kFar);
   find_start(robot);
-  if (has_start_) flood(robot);
+  if (map_.contains(map_.cell_of(robot))) flood(robot);
 }
 
 void ExplorationSpace::classify() {
@@ -126,7 +127,7 @@ void ExplorationSpace::measure_clearance() {
         clearance_[i] = value(x, site[t]);
         if (x == from[t]) --top;
       }
-      if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kPassable;
+      if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kClear | kPassable;
     }
   }
 }
@@ -159,11 +160,15 @@ std::optional<Eigen::Vector2i> ExplorationSpace::nearest_cell(const Vec2& p,
 }
 
 void ExplorationSpace::find_start(const Vec2& robot) {
+  start_ = robot;
   const auto cell = nearest_cell(
-      robot, [&](const Eigen::Vector2i& c) { return (flags_[map_.index(c)] & kPassable) != 0; });
-  has_start_ = cell.has_value();
-  if (!cell) return;
-  start_ = *cell == map_.cell_of(robot) ? robot : map_.centre_of(*cell);
+      robot, [&](const Eigen::Vector2i& c) { return (flags_[map_.index(c)] & kClear) != 0; });
+  if (!cell || *cell == map_.cell_of(robot)) return;
+  start_ = map_.centre_of(*cell);
+  walk_line(map_, robot, start_, [&](const Eigen::Vector2i& c) {
+    if (map_.contains(c)) flags_[map_.index(c)] |= kPassable;
+    return true;
+  });
 }
 
 std::optional<Eigen::Vector2i> ExplorationSpace::nearest_reachable(const Vec2& p) const {
@@ -174,11 +179,11 @@ void ExplorationSpace::flood(const Vec2& robot) {
   constexpr std::size_t kRing = kDiagonal + 1;
   std::array<std::vector<std::uint32_t>, kRing> buckets;
   const int width = map_.width;
-  const std::size_t first = map_.index(map_.cell_of(start_));
-  travel_[first] = static_cast<std::uint32_t>(
-      std::lround((start_ - robot).norm() / map_.resolution * kStraight));
-  std::uint32_t cost = travel_[first];
-  buckets[cost % kRing].push_back(static_cast<std::uint32_t>(first));
+  const std::size_t first = map_.index(map_.cell_of(robot));
+  if ((flags_[first] & kPassable) == 0) return;
+  travel_[first] = 0;
+  buckets[0].push_back(static_cast<std::uint32_t>(first));
+  std::uint32_t cost = 0;
   std::size_t open = 1;
   const std::array<int, 4> dx{1, 0, -1, 0}, dy{0, 1, 0, -1};
   for (; open > 0; ++cost) {
@@ -187,6 +192,7 @@ void ExplorationSpace::flood(const Vec2& robot) {
       --open;
       const std::uint32_t i = bucket[k];
       if (travel_[i] != cost) continue;
+      has_start_ |= (flags_[i] & kClear) != 0;
       const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
       const auto relax = [&](std::size_t to, std::uint32_t step) {
         if (cost + step >= travel_[to]) return;

@@ -78,13 +78,14 @@ class ExplorationSpace {
 
   /// Whether the vehicle stands in or beside known-free space that it can leave.
   [[nodiscard]] bool has_start() const { return has_start_; }
-  /// Where its known-free space begins: the nearest passable point to the vehicle.
+  /// Where its known-free space begins: the nearest clear point to the vehicle; where there is none
+  /// but the way back, the vehicle's own place.
   [[nodiscard]] const Vec2& start() const { return start_; }
   [[nodiscard]] bool is_reachable(const Eigen::Vector2i& cell) const {
     return map_.contains(cell) && travel_[map_.index(cell)] != kFar;
   }
   /// Length of the shortest 8-connected way from the vehicle through known-free cells at the travel
-  /// radius, corners not cut; kUnreachable if there is none.
+  /// radius and through cells that it flew through, corners not cut; kUnreachable if there is none.
   [[nodiscard]] double travel_distance(const Eigen::Vector2i& cell) const;
 
   /// The reachable cell nearest to p within the start reach; none if there is none.
@@ -99,7 +100,9 @@ class ExplorationSpace {
   [[nodiscard]] bool sees(const Vec2& from, const Eigen::Vector2i& target) const;
 
  private:
-  static constexpr std::uint8_t kFree = 1, kUnknown = 2, kInside = 4, kPassable = 8;
+  static constexpr std::uint8_t kFree = 1, kUnknown = 2, kInside = 4;
+  static constexpr std::uint8_t kClear = 8;      ///< free, and as far from obstacles as it travels
+  static constexpr std::uint8_t kPassable = 16;  ///< clear, flown through, or on the way to start()
   static constexpr std::uint32_t kFar = std::numeric_limits<std::uint32_t>::max();
 
   void classify();

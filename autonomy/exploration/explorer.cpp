@@ -25,7 +25,7 @@ Decision Explorer::decide(const OccupancyMap2D& map, const ExplorerInput& input)
     target_.reset();
   } else if (target_) {
     decision.kind = DecisionKind::kKeepTarget;
-    set_goal(decision);
+    set_goal(decision, map);
   } else if (!space.has_start()) {
     decision.kind = DecisionKind::kWait;
   } else {
@@ -139,29 +139,34 @@ std::vector<Candidate> Explorer::assess(CandidateSource source, const Exploratio
 
 void Explorer::choose(Decision& decision, const ExplorationSpace& space,
                       const ExplorerInput& input) {
-  double most_m2 = 0;
-  bool any = false;
   for (const auto source :
        {CandidateSource::kTrees, CandidateSource::kExhaustive, CandidateSource::kForgiving}) {
-    decision.source = source;
-    decision.candidates = assess(source, space, input);
-    any = false;
-    for (const Candidate& c : decision.candidates) {
-      if (c.verdict != Verdict::kKept) continue;
-      any = true;
-      most_m2 = std::max(most_m2, c.information_m2);
-    }
-    if (any && most_m2 >= config_.stop.min_area_m2) break;
+    if (ask(source, decision, space, input)) return select(decision, space.map());
   }
-  if (!any || most_m2 < config_.stop.min_area_m2) {
-    decision.kind = DecisionKind::kStop;
-    decision.stop_reason = any ? StopReason::kLittleLeft : StopReason::kNoCandidates;
-    decision.open_frontier_m2 = 0;
-    for (const Frontier& frontier : find_frontiers(space)) {
-      decision.open_frontier_m2 = std::max(*decision.open_frontier_m2, frontier.unknown_area_m2);
-    }
-    return;
+  stop(decision, space);
+}
+
+bool Explorer::ask(CandidateSource source, Decision& decision, const ExplorationSpace& space,
+                   const ExplorerInput& input) const {
+  decision.source = source;
+  decision.candidates = assess(source, space, input);
+  return std::any_of(decision.candidates.begin(), decision.candidates.end(), [&](const auto& c) {
+    return c.verdict == Verdict::kKept && c.information_m2 >= config_.stop.min_area_m2;
+  });
+}
+
+void Explorer::stop(Decision& decision, const ExplorationSpace& space) const {
+  const bool any = std::any_of(decision.candidates.begin(), decision.candidates.end(),
+                               [](const auto& c) { return c.verdict == Verdict::kKept; });
+  decision.kind = DecisionKind::kStop;
+  decision.stop_reason = any ? StopReason::kLittleLeft : StopReason::kNoCandidates;
+  decision.open_frontier_m2 = 0;
+  for (const Frontier& frontier : find_frontiers(space)) {
+    decision.open_frontier_m2 = std::max(*decision.open_frontier_m2, frontier.unknown_area_m2);
   }
+}
+
+void Explorer::select(Decision& decision, const OccupancyMap2D& map) {
   if (config_.revenue.direction_aware) {
     apply_direction_filter(decision.candidates, config_.filter);
   }
@@ -170,13 +175,18 @@ void Explorer::choose(Decision& decision, const ExplorationSpace& space,
   target_ = Target{winner.point, winner.viewpoint};
   history_.push(winner.point);
   decision.kind = DecisionKind::kNewTarget;
-  set_goal(decision);
+  set_goal(decision, map);
 }
 
-void Explorer::set_goal(Decision& decision) const {
+void Explorer::set_goal(Decision& decision, const OccupancyMap2D& map) const {
   const Vec2 look = target_->point - target_->viewpoint;
   decision.target = target_->point;
-  decision.goal_O = {target_->viewpoint.x(), target_->viewpoint.y(), config_.flight_height_m};
+  double height = config_.flight_height_m;
+  if (config_.follow_ground) {
+    const double ground = map.ground.at(target_->viewpoint);
+    if (std::isfinite(ground)) height += ground;
+  }
+  decision.goal_O = {target_->viewpoint.x(), target_->viewpoint.y(), height};
   decision.goal_yaw_rad = std::atan2(look.y(), look.x());
 }
 

@@ -26,6 +26,7 @@ struct ExplorerConfig {
   StopConfig stop;
   ConsumptionConfig consumption;
   double flight_height_m = 1.5;
+  bool follow_ground = false;
   bool reevaluate = true;
   bool legs_as_flown = false;
 
@@ -40,6 +41,8 @@ struct ExplorerConfig {
     f("stop", stop, "stop criteria");
     f("consumption", consumption, "battery and power as believed");
     f("flight_height_m", flight_height_m, "z of the goals in O");
+    f("follow_ground", follow_ground,
+      "flight_height_m counts from the mapped ground under a goal; false: from O's origin");
     f("reevaluate", reevaluate, "drop a target whose unknown area was seen from afar");
     f("legs_as_flown", legs_as_flown,
       "a target dropped on the way counts in T_{t-1} as where the vehicle was; false: as printed");
@@ -132,11 +135,16 @@ class Explorer {
   void balance(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input) const;
   TargetEnd settle_target(const ExplorationSpace& space, const ExplorerInput& input);
   void choose(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input);
+  /// Asks one source. @return whether it has a candidate worth the flight
+  bool ask(CandidateSource source, Decision& decision, const ExplorationSpace& space,
+           const ExplorerInput& input) const;
+  void stop(Decision& decision, const ExplorationSpace& space) const;
+  void select(Decision& decision, const OccupancyMap2D& map);
   /// Whether there still is something to see at a target: enough unknown area, and a border to it.
   [[nodiscard]] bool is_worthwhile(const ExplorationSpace& space, const Vec2& point) const;
   [[nodiscard]] std::vector<Candidate> assess(CandidateSource source, const ExplorationSpace& space,
                                               const ExplorerInput& input) const;
-  void set_goal(Decision& decision) const;
+  void set_goal(Decision& decision, const OccupancyMap2D& map) const;
 
   ExplorerConfig config_;
   FrontierDetector detector_;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "exploration/line_walk.h"
 #include "exploration/mean_shift.h"
+#include "mapping/line_walk.h"
 
 namespace arex {
 namespace {

@@ -88,7 +88,9 @@ std::vector<Frontier> find_frontiers(const ExplorationSpace& space) {
   std::vector<Eigen::Vector2i> border;
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
-      if (!space.is_reachable({x, y}) || !borders_unknown(space, {x, y})) continue;
+      // Reachable by having been flown through is not enough: what it borders may be no free space.
+      if (!space.is_reachable({x, y}) || !space.is_free({x, y})) continue;
+      if (!borders_unknown(space, {x, y})) continue;
       border.emplace_back(x, y);
       open[map.index({x, y})] = true;
     }

@@ -30,8 +30,6 @@ class GlobalMap {
   /// -1 unknown, 0 free, 1 occupied; unknown outside the bounds.
   [[nodiscard]] int state(const Cell& cell) const;
   [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return refreshed_band().map(); }
-  /// Height of the ground under a point, m in O; NaN where none was seen nearby (kAbsolute: 0).
-  [[nodiscard]] double ground_at(const Vec2& p) const { return refreshed_band().ground_at(p); }
   [[nodiscard]] const StateTree& tree() const { return tree_; }
   /// Volume known so far, m^3.
   [[nodiscard]] double known_volume() const;

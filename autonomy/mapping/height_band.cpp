@@ -25,12 +25,14 @@ HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const
       column_(static_cast<std::size_t>(brick_count.z())) {
   const int ground = reference_ == BandReference::kGround ? kNoGround : 0;
   for (Tile& tile : tiles_) tile.lowest = tile.ground = ground;
-  map_.origin = box.low.head<2>().cast<double>() * resolution_m;
-  map_.resolution = resolution_m;
-  map_.width = box.size().x();
-  map_.height = box.size().y();
+  map_ = map_geometry(box, resolution_m);
   map_.cells.assign(static_cast<std::size_t>(map_.width) * static_cast<std::size_t>(map_.height),
                     OccupancyMap2D::kUnknown);
+  if (reference_ != BandReference::kGround) return;
+  map_.ground.tile_m = resolution_m * kBrickCells;
+  map_.ground.origin = brick_low.head<2>().cast<double>() * map_.ground.tile_m;
+  map_.ground.width = brick_count.x();
+  map_.ground.heights.assign(tiles_.size(), std::numeric_limits<float>::quiet_NaN());
 }
 
 void HeightBand::note(const BrickChange& change) {
@@ -110,6 +112,8 @@ void HeightBand::spread_ground() {
     if (ground == tiles_[t].ground) continue;
     tiles_[t].ground = ground;
     tiles_[t].dirty = true;
+    map_.ground.heights[t] = ground < kNoGround / 2 ? static_cast<float>(ground * resolution_m_)
+                                                    : std::numeric_limits<float>::quiet_NaN();
   }
 }
 
@@ -146,16 +150,6 @@ void HeightBand::evaluate(std::size_t t) {
                                    : (enough & bit) != 0 ? OccupancyMap2D::kFree
                                                          : OccupancyMap2D::kUnknown;
   }
-}
-
-double HeightBand::ground_at(const Vec2& p) const {
-  const int x = (static_cast<int>(std::floor(p.x() / resolution_m_)) >> 3) - brick_low_.x();
-  const int y = (static_cast<int>(std::floor(p.y() / resolution_m_)) >> 3) - brick_low_.y();
-  if (x < 0 || y < 0 || x >= brick_count_.x() || y >= brick_count_.y()) {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const int ground = tiles_[static_cast<std::size_t>(y * brick_count_.x() + x)].ground;
-  return ground < kNoGround / 2 ? ground * resolution_m_ : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace arex

@@ -10,6 +10,16 @@
 
 namespace arex {
 
+/// Where the 2D map of a box lies; without cells.
+[[nodiscard]] inline OccupancyMap2D map_geometry(const CellBox& box, double resolution_m) {
+  OccupancyMap2D map;
+  map.origin = box.low.head<2>().cast<double>() * resolution_m;
+  map.resolution = resolution_m;
+  map.width = box.size().x();
+  map.height = box.size().y();
+  return map;
+}
+
 /// The 2D occupancy of the exploration from a height band of the voxel map (paper, Environmental
 /// Modelling: points 0-2 m above ground).
 ///
@@ -31,8 +41,6 @@ class HeightBand {
              const Cell& brick_low, const Cell& brick_count);
 
   [[nodiscard]] const OccupancyMap2D& map() const { return map_; }
-  /// The ground under a point, m in O; not finite where none was seen nearby.
-  [[nodiscard]] double ground_at(const Vec2& p) const;
 
   /// Marks the tile of a brick that changed.
   void note(const BrickChange& change);

@@ -2,11 +2,31 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "math/types.h"
 
 namespace arex {
+
+/// Heights of the ground, m in O, in square tiles; row-major, x fastest. NaN where none was seen
+/// nearby.
+struct GroundHeights {
+  Vec2 origin = Vec2::Zero();  ///< lower corner of tile (0, 0), m
+  double tile_m = 0.8;         ///< edge of a tile
+  int width = 0;               ///< tiles along x
+  std::vector<float> heights;
+
+  /// NaN where none was seen nearby, and outside.
+  [[nodiscard]] double at(const Vec2& p) const {
+    const Eigen::Vector2i tile = ((p - origin) / tile_m).array().floor().cast<int>();
+    const auto count = static_cast<int>(heights.size());
+    if (tile.minCoeff() < 0 || tile.x() >= width || tile.y() * width >= count) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    return heights[static_cast<std::size_t>(tile.y() * width + tile.x())];
+  }
+};
 
 /// The 2D occupancy map of the exploration in O: -1 unknown, 0 free, 1 occupied (paper,
 /// Environmental Modelling). Row-major, x fastest: cells[iy * width + ix].
@@ -20,6 +40,10 @@ struct OccupancyMap2D {
   int width = 0;               ///< cells along x
   int height = 0;              ///< cells along y
   std::vector<std::int8_t> cells;
+  /// Indices of the cells that the vehicle's centre flew through, a chain in which neighbours share
+  /// a side. Whatever the height band says about them: there is a way.
+  std::vector<std::uint32_t> flown;
+  GroundHeights ground;  ///< empty where the map's height band does not stand on the ground
 
   [[nodiscard]] Eigen::Vector2i cell_of(const Vec2& p) const {
     return ((p - origin) / resolution).array().floor().cast<int>();

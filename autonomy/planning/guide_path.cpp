@@ -45,6 +45,11 @@ class CostMap {
         }
       }
     }
+    const auto width = static_cast<std::uint32_t>(map.width);
+    for (const std::uint32_t k : map.flown) {
+      double& cost = cost_[index({static_cast<int>(k % width), static_cast<int>(k / width)})];
+      if (cost == kBlocked) cost = 1.0 + config.comfort_weight;
+    }
   }
 
   [[nodiscard]] std::size_t count() const { return cost_.size(); }

@@ -52,7 +52,8 @@ struct GuidePath {
 /// The guide for goals further than the local grid: an 8-connected A* over the 2D occupancy map,
 /// corners not cut, then pulled straight where that is no dearer. Outside the map everything is
 /// unknown, and unknown cells may be crossed at a cost. Start and goal may lie too close to
-/// obstacles: the cells within obstacle_distance_m of either may be crossed unless occupied.
+/// obstacles: the cells within obstacle_distance_m of either may be crossed unless occupied. Cells
+/// that were flown through may always be crossed.
 [[nodiscard]] GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to,
                                    const GuideConfig& config);
 

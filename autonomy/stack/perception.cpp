@@ -23,6 +23,7 @@ Perception::Perception(const StackConfig& config, JobQueue& jobs)
       jobs_(jobs),
       mapper_(config.mapping.local, config.mapping.global, config.mapping.resolution_m,
               config.planning.inflation_m, config.vehicle),
+      trail_(map_geometry(mapper_.global().box(), config.mapping.resolution_m)),
       cloud_(config.mapping.cloud),
       mapping_lane_(jobs.add_lane("mapping")),
       global_map_lane_(jobs.add_lane("global_map")),
@@ -36,6 +37,7 @@ void Perception::add_odometry(const Odometry& odometry) {
   }
   poses_.push_back({odometry.stamp, odometry.X_OB});
   while (poses_.back().stamp - poses_.front().stamp > kPosesKept) poses_.pop_front();
+  trail_.add(odometry.X_OB.p.head<2>());
 }
 
 Pose Perception::pose_at(Stamp stamp) const {
@@ -121,12 +123,12 @@ void Perception::add_globally(const std::shared_ptr<const RayCaster>& rays, bool
                  [this, rays, with_map_2d]() -> JobQueue::Delivery {
                    mapper_.integrate_globally(*rays);
                    if (!with_map_2d) return nullptr;
-                   return
-                       [this, volume = mapper_.global().known_volume(),
-                        map_2d = std::make_shared<const OccupancyMap2D>(mapper_.occupancy_2d())] {
-                         map_2d_ = map_2d;
-                         known_volume_m3_ = volume;
-                       };
+                   return [this, volume = mapper_.global().known_volume(),
+                           map_2d = std::make_shared<OccupancyMap2D>(mapper_.occupancy_2d())] {
+                     map_2d->flown = trail_.cells();
+                     map_2d_ = map_2d;
+                     known_volume_m3_ = volume;
+                   };
                  });
 }
 

@@ -3,6 +3,7 @@
 #include <deque>
 #include <memory>
 
+#include "mapping/flown_trail.h"
 #include "mapping/mapper.h"
 #include "mapping/point_cloud_map.h"
 #include "messages/registered_scan.h"
@@ -53,6 +54,7 @@ class Perception {
   Pose X_BC_;
   JobQueue& jobs_;
   Mapper mapper_;
+  FlownTrail trail_;
   PointCloudMap cloud_;
   JobQueue::Lane mapping_lane_;  ///< the mapper's local grid
   JobQueue::Lane global_map_lane_;

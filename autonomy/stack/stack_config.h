@@ -129,6 +129,8 @@ struct StackConfig {
     const bool plans = mission.kind == MissionConfig::Kind::kGoals ||
                        mission.kind == MissionConfig::Kind::kExplore;
     f.check(mapping.enabled || !plans, "mapping.enabled true for missions that plan");
+    f.check(!exploration.explorer.follow_ground || mapping.global.band == BandReference::kGround,
+            "exploration.follow_ground only with mapping.global.band: ground");
   }
 };
 

@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "autonomy/exploration/test_map.h"
+#include "exploration/frontier_search.h"
 
 namespace arex {
 namespace {
@@ -207,6 +208,58 @@ TEST(ExplorationSpace, GapsNarrowerThanTheVehicleAreNoWay) {
     config.travel_radius_m = 0.55;
     EXPECT_EQ(ExplorationSpace(open, wide(), config, robot).is_reachable({50, 30}), gap == 11);
   }
+}
+
+/// Two halves behind a wall, and the vehicle in the right one, having come through a gap that has
+/// closed since.
+OccupancyMap2D closed_behind(bool flown) {
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kFree);
+  test::fill(map, {30, 0}, {31, 59}, OccupancyMap2D::kOccupied);
+  test::fill(map, {32, 20}, {33, 40}, OccupancyMap2D::kUnknown);
+  for (int x = 10; flown && x <= 45; ++x) {
+    map.flown.push_back(static_cast<std::uint32_t>(map.index({x, 30})));
+  }
+  return map;
+}
+
+TEST(ExplorationSpace, TheWayThatTheVehicleCameStaysOpen) {
+  for (const bool flown : {false, true}) {
+    const OccupancyMap2D map = closed_behind(flown);
+    const ExplorationSpace space(map, wide(), {}, map.centre_of({45, 30}));
+    EXPECT_TRUE(space.is_reachable({55, 10}));
+    EXPECT_EQ(space.is_reachable({5, 50}), flown);
+    if (flown) EXPECT_NEAR(space.travel_distance({10, 30}), 3.5, 1e-9);
+    // A way is no free space: nothing is seen across the wall, and the unknown beside the way is no
+    // frontier of the way's own cells.
+    EXPECT_FALSE(space.is_free({30, 30}));
+    EXPECT_FALSE(space.sees(map.centre_of({40, 30}), {20, 30}));
+    for (const Frontier& frontier : find_frontiers(space)) {
+      for (const Eigen::Vector2i& cell : frontier.cells) EXPECT_TRUE(space.is_free(cell));
+    }
+  }
+}
+
+TEST(ExplorationSpace, LeavesAPocketByTheWayThatItCame) {
+  // Flown into a gap between two cars that is narrower than the travel radius.
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kFree);
+  test::fill(map, {30, 20}, {59, 25}, OccupancyMap2D::kOccupied);
+  test::fill(map, {30, 31}, {59, 36}, OccupancyMap2D::kOccupied);
+  const Vec2 robot = map.centre_of({50, 28});
+  EXPECT_FALSE(ExplorationSpace(map, wide(), {}, robot).has_start());
+  for (int x = 20; x <= 50; ++x) {
+    map.flown.push_back(static_cast<std::uint32_t>(map.index({x, 28})));
+  }
+  const ExplorationSpace space(map, wide(), {}, robot);
+  EXPECT_TRUE(space.has_start());
+  EXPECT_NEAR(space.travel_distance({20, 28}), 3.0, 1e-9);
+}
+
+TEST(ExplorationSpace, AWayThatLeadsNowhereClearIsNoStart) {
+  // Just taken off: nothing is known but that it stands here.
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kUnknown);
+  map.flown = {static_cast<std::uint32_t>(map.index({30, 30})),
+               static_cast<std::uint32_t>(map.index({31, 30}))};
+  EXPECT_FALSE(ExplorationSpace(map, wide(), {}, map.centre_of({31, 30})).has_start());
 }
 
 }  // namespace

@@ -290,6 +290,27 @@ TEST(Explorer, WaitsWhileItKnowsNothing) {
   EXPECT_EQ(explorer.decide(map, ExplorerInput{}).kind, DecisionKind::kWait);
 }
 
+TEST(Explorer, FliesAtItsHeightAboveTheGroundOfTheGoal) {
+  for (const bool follows : {true, false}) {
+    Hall hall;
+    hall.config.follow_ground = follows;
+    hall.config.flight_height_m = 1.5;
+    // A floor 8.5 m below, falling by 2 in 100 along x; none was seen in the first tile.
+    hall.map.ground.tile_m = 0.8;
+    hall.map.ground.origin = hall.map.origin;
+    hall.map.ground.width = 25;
+    for (int i = 0; i < 25 * 10; ++i) {
+      const double x = hall.map.origin.x() + 0.8 * (i % 25 + 0.5);
+      hall.map.ground.heights.push_back(static_cast<float>(-8.5 - 0.02 * x));
+    }
+    Explorer explorer(hall.config, 0.1, 1);
+    const Decision d = explorer.decide(hall.map, hall.input);
+    ASSERT_EQ(d.kind, DecisionKind::kNewTarget);
+    const double floor = -8.5 - 0.02 * d.goal_O.x();
+    EXPECT_NEAR(d.goal_O.z(), follows ? floor + 1.5 : 1.5, 0.02 * 0.4 + 1e-6);
+  }
+}
+
 TEST(Explorer, CaseCActsOnlyWhereDirectionAware) {
   for (const bool aware : {true, false}) {
     // Free in the middle, unknown at both ends; the first two targets go east.

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "exploration/line_walk.h"
+#include "mapping/line_walk.h"
 #include "mapping/occupancy_map_2d.h"
 #include "math/random.h"
 

@@ -248,6 +248,47 @@ TEST(GlobalMap, CutsAnAbsoluteBandBetweenFloorAndCeiling) {
   EXPECT_EQ(at(6, 6), OccupancyMap2D::kUnknown);
 }
 
+TEST(GlobalMap, FollowsATiltedFloorUnderACeiling) {
+  // O tilted by 0.55 degrees in a hall of 3.5 m; its floor is seen from 12 m on only, the ceiling
+  // everywhere, and a duct hangs down to 2.4 m.
+  constexpr double kTilt = 0.0096;
+  GlobalMapConfig config;
+  config.low_m = {-20, -4, -11};
+  config.high_m = {20, 4, -2};
+  config.band_low_m = 0.5;
+  config.band_high_m = 2.0;
+  config.ground_max_slope = 0.03;
+  GlobalMap map(config, kResolution);
+  Painter painter(map);
+  const auto floor = [](double x) { return -8.45 + kTilt * x; };
+  for (double x = -19.95; x < 20; x += 0.1) {
+    for (double y = -3.95; y < 4; y += 0.1) {
+      painter.free_between({x, y, floor(x) + 3.5}, {x, y, floor(x)});
+      painter.occupied({x, y, floor(x) + 3.5});
+      if (x > -8) painter.occupied({x, y, floor(x)});
+      if (std::abs(x - 2) < 0.3) painter.occupied({x, y, floor(x) + 2.45});
+    }
+  }
+  for (double z = 0; z < 1.4; z += 0.1)
+    painter.occupied({12.05, 0.05, floor(12) + z});  // a bollard
+  painter.show();
+  const OccupancyMap2D& out = map.occupancy_2d();
+  int free = 0, occupied = 0;
+  for (const std::int8_t c : out.cells) {
+    free += c == OccupancyMap2D::kFree;
+    occupied += c == OccupancyMap2D::kOccupied;
+  }
+  EXPECT_EQ(occupied, 1);  // neither floor, nor ceiling, nor duct
+  EXPECT_EQ(out.at(out.cell_of({12.05, 0.05})), OccupancyMap2D::kOccupied);
+  EXPECT_EQ(free, 400 * 80 - 1);
+  for (double x = -19.9; x < 20; x += 0.37) {
+    // Within a layer and what a tile rises; before the first floor it may rise at the limit.
+    const double unseen = std::max(0.0, -8 - x) * (config.ground_max_slope + kTilt);
+    EXPECT_NEAR(out.ground.at({x, 1}), floor(x), 0.15 + unseen) << x;
+  }
+  EXPECT_TRUE(std::isnan(out.ground.at({-23.5, 0})));
+}
+
 TEST(GlobalMap, RefreshesThe2DMapAsIfMadeAnew) {
   const GlobalMapConfig config = room_config();
   RayCaster rays(kResolution);
@@ -262,7 +303,7 @@ TEST(GlobalMap, RefreshesThe2DMapAsIfMadeAnew) {
   for (int iy = 0; iy < out.height; ++iy) {
     for (int ix = 0; ix < out.width; ++ix) {
       const Cell column(map.box().low.x() + ix, map.box().low.y() + iy, 0);
-      const double ground = map.ground_at(out.centre_of({ix, iy}));
+      const double ground = out.ground.at(out.centre_of({ix, iy}));
       int full = 0, empty = 0;
       for (int dz = 4; dz < 20 && std::isfinite(ground); ++dz) {
         const int state = map.state(

@@ -110,6 +110,18 @@ TEST(GuidePath, LeavesAStartBesideAnObstacle) {
   EXPECT_EQ(path.status, GuideStatus::kFound);
 }
 
+TEST(GuidePath, LeavesAPocketByTheWayThatItCame) {
+  OccupancyMap2D map = empty_map(200, 100);
+  fill(map, 20, 20, 120, 80, OccupancyMap2D::kOccupied);
+  EXPECT_EQ(plan_guide(map, {7, 5}, {15, 5}, {}).status, GuideStatus::kPartial);
+  for (int y = 5; y <= 50; ++y) map.flown.push_back(static_cast<std::uint32_t>(map.index({70, y})));
+  const GuidePath path = plan_guide(map, map.centre_of({70, 50}), {15, 5}, {});
+  EXPECT_EQ(path.status, GuideStatus::kFound);
+  for (const Vec2& p : path.points) {
+    if (p.y() > 2 && p.y() < 8 && p.x() < 12) EXPECT_NEAR(p.x(), 7.05, 1e-9);
+  }
+}
+
 TEST(GuidePath, StraightModeDoesNotSearch) {
   OccupancyMap2D map = empty_map(50, 50);
   fill(map, 20, 0, 21, 49, OccupancyMap2D::kOccupied);

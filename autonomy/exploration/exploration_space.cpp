@@ -222,6 +222,19 @@ void ExplorationSpace::flood(const Vec2& robot) {
   }
 }
 
+std::optional<Vec2> ExplorationSpace::nearest_clearing(double clearance_m) const {
+  std::optional<Eigen::Vector2i> nearest;
+  for (int y = 0; y < map_.height; ++y) {
+    for (int x = 0; x < map_.width; ++x) {
+      const Eigen::Vector2i cell(x, y);
+      if (!is_reachable(cell) || !is_free(cell) || clearance(cell) < clearance_m) continue;
+      if (!nearest || travel_[map_.index(cell)] < travel_[map_.index(*nearest)]) nearest = cell;
+    }
+  }
+  if (!nearest) return std::nullopt;
+  return map_.centre_of(*nearest);
+}
+
 bool ExplorationSpace::is_frontier(const Eigen::Vector2i& cell) const {
   return is_unknown(cell) &&
          (is_free({cell.x() - 1, cell.y()}) || is_free({cell.x() + 1, cell.y()}) ||

@@ -91,6 +91,10 @@ class ExplorationSpace {
   /// The reachable cell nearest to p within the start reach; none if there is none.
   [[nodiscard]] std::optional<Eigen::Vector2i> nearest_reachable(const Vec2& p) const;
 
+  /// The centre of the reachable free cell, as far as this from obstacles, to which the way is the
+  /// shortest; none if there is none.
+  [[nodiscard]] std::optional<Vec2> nearest_clearing(double clearance_m) const;
+
   /// f_I: unknown area, m^2, of the cells inside the bounds whose centres lie within the
   /// information radius of p.
   [[nodiscard]] double unknown_area(const Vec2& p) const;

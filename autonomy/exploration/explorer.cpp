@@ -31,6 +31,10 @@ Decision Explorer::decide(const OccupancyMap2D& map, const ExplorerInput& input)
   } else {
     choose(decision, space, input);
   }
+  if (decision.kind == DecisionKind::kStop && !config_.stop.return_home) {
+    const auto place = space.nearest_clearing(config_.stop.landing_clearance_m);
+    if (place) decision.landing_O = at_flight_height(*place, map);
+  }
   return decision;
 }
 
@@ -181,13 +185,14 @@ void Explorer::select(Decision& decision, const OccupancyMap2D& map) {
 void Explorer::set_goal(Decision& decision, const OccupancyMap2D& map) const {
   const Vec2 look = target_->point - target_->viewpoint;
   decision.target = target_->point;
-  double height = config_.flight_height_m;
-  if (config_.follow_ground) {
-    const double ground = map.ground.at(target_->viewpoint);
-    if (std::isfinite(ground)) height += ground;
-  }
-  decision.goal_O = {target_->viewpoint.x(), target_->viewpoint.y(), height};
+  decision.goal_O = at_flight_height(target_->viewpoint, map);
   decision.goal_yaw_rad = std::atan2(look.y(), look.x());
+}
+
+Vec3 Explorer::at_flight_height(const Vec2& place, const OccupancyMap2D& map) const {
+  const double ground = config_.follow_ground ? map.ground.at(place) : 0.0;
+  return {place.x(), place.y(),
+          config_.flight_height_m + (std::isfinite(ground) ? ground : 0.0)};
 }
 
 }  // namespace arex

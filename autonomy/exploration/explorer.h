@@ -107,6 +107,8 @@ struct Decision {
   /// Of a stop for want of candidates: the largest f_I of all frontiers that the exhaustive search
   /// still reaches, whatever the filters and the blacklist made of them.
   std::optional<double> open_frontier_m2;
+  /// Of a stop that does not lead home: above the nearest place to land; none was found without.
+  std::optional<Vec3> landing_O;
   double home_distance_m = 0;  ///< along the known path
   EnergyBalance energy;
 };
@@ -145,6 +147,7 @@ class Explorer {
   [[nodiscard]] std::vector<Candidate> assess(CandidateSource source, const ExplorationSpace& space,
                                               const ExplorerInput& input) const;
   void set_goal(Decision& decision, const OccupancyMap2D& map) const;
+  [[nodiscard]] Vec3 at_flight_height(const Vec2& place, const OccupancyMap2D& map) const;
 
   ExplorerConfig config_;
   FrontierDetector detector_;

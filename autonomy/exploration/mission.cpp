@@ -99,8 +99,8 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
       waypoint_ = 0;
       break;
     case MissionState::kReturn:
-      request_ = {MotionRequest::Kind::kGoTo, home_O_};
-      events_(EventKind::kTargetSelected, describe(home_O_));
+      request_ = {MotionRequest::Kind::kGoTo, config_.land_at_start ? home_O_ : *landing_O_};
+      events_(EventKind::kTargetSelected, describe(request_.goal_O));
       break;
     case MissionState::kExplore:
       break;  // hovers until the explorer's first word
@@ -177,7 +177,8 @@ void Mission::select_waypoint(std::size_t index) {
 
 void Mission::explore(const Inputs& inputs) {
   if (stop_exploring_) {
-    enter(config_.land_at_start ? MissionState::kReturn : MissionState::kLand, inputs);
+    const bool flies_there = config_.land_at_start || landing_O_;
+    enter(flies_there ? MissionState::kReturn : MissionState::kLand, inputs);
     return;
   }
   if (request_.kind != MotionRequest::Kind::kGoTo) return;
@@ -200,6 +201,7 @@ void Mission::decide(const Decision& decision) {
                                                          : EventKind::kMissionState,
             "stop exploring: " + std::string(reason));
     stop_exploring_ = true;
+    landing_O_ = decision.landing_O;
   } else if (decision.kind == DecisionKind::kNewTarget) {
     target_progress_ = TargetProgress::kUnderWay;
     request_ = {MotionRequest::Kind::kGoTo, decision.goal_O, 0, decision.sequence};

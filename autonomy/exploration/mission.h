@@ -75,7 +75,7 @@ enum class MissionState {
   kEntry,  ///< legs into the area to explore
   kFly,    ///< waypoints, goals, yaw bursts
   kExplore,
-  kReturn,
+  kReturn,  ///< to the start, or to where it lands instead
   kLand,
   kLost,
   kDone,
@@ -146,6 +146,7 @@ class Mission {
   Vec3 home_O_ = Vec3::Zero();  ///< above the start, at take-off height
   TargetProgress target_progress_ = TargetProgress::kUnderWay;
   bool stop_exploring_ = false;
+  std::optional<Vec3> landing_O_;  ///< of an exploration that does not land at the start
   int returns_ = 0;
   std::string stuck_;
   Stamp lost_since_ = -1;  ///< -1: odometry is there

@@ -24,6 +24,7 @@ struct StopConfig {
   bool return_home = true;
   double return_speed_mps = 1.0;  ///< half the planner's limit: it brakes and turns on the way
   double landing_s = 20;
+  double landing_clearance_m = 1.0;  ///< the vehicle's 0.3 m and a drift of twice that
   double energy_margin = 1.15;
   double detour_factor = 2.0;
 
@@ -33,12 +34,15 @@ struct StopConfig {
     f("return_home", return_home, "keep energy for the way home; false: it lands where it is");
     f("return_speed_mps", return_speed_mps, "mean speed on the way home");
     f("landing_s", landing_s, "time to turn round, hover and land");
+    f("landing_clearance_m", landing_clearance_m,
+      "of the place from obstacles where it does not land at home: the nearest such one");
     f("energy_margin", energy_margin, "factor on the energy home: wind, replanning");
     f("detour_factor", detour_factor, "on the straight distance, where no known path leads home");
     f.check(min_area_m2 >= 0, "min_area_m2 >= 0");
     f.check(reserve_fraction >= 0 && reserve_fraction < 1, "reserve_fraction in [0, 1)");
     f.check(return_speed_mps > 0, "return_speed_mps > 0");
     f.check(landing_s >= 0, "landing_s >= 0");
+    f.check(landing_clearance_m >= 0, "landing_clearance_m >= 0");
     f.check(energy_margin >= 1, "energy_margin >= 1");
     f.check(detour_factor >= 1, "detour_factor >= 1");
   }

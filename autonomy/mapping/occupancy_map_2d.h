@@ -40,8 +40,8 @@ struct OccupancyMap2D {
   int width = 0;               ///< cells along x
   int height = 0;              ///< cells along y
   std::vector<std::int8_t> cells;
-  /// Indices of the cells that the vehicle's centre flew through, a chain in which neighbours share
-  /// a side. Whatever the height band says about them: there is a way.
+  /// Indices of the cells that the vehicle's centre flew through under the planner, each sharing a
+  /// side with one before. Whatever the height band says about them: there is a way.
   std::vector<std::uint32_t> flown;
   GroundHeights ground;  ///< empty where the map's height band does not stand on the ground
 

@@ -37,7 +37,6 @@ void Perception::add_odometry(const Odometry& odometry) {
   }
   poses_.push_back({odometry.stamp, odometry.X_OB});
   while (poses_.back().stamp - poses_.front().stamp > kPosesKept) poses_.pop_front();
-  trail_.add(odometry.X_OB.p.head<2>());
 }
 
 Pose Perception::pose_at(Stamp stamp) const {

@@ -21,6 +21,8 @@ class Perception {
 
   /// Every estimate, in order: depth frames are placed by the poses around their stamp.
   void add_odometry(const Odometry& odometry);
+  /// Where the vehicle goes under the planner: the 2D map keeps that way open.
+  void note_flown(const Vec3& p_OB) { trail_.add(p_OB.head<2>()); }
   /// An undistorted frame of the odometry.
   void add_scan(Stamp now, const ScanUpdate& update);
   /// A raw frame, placed by the poses kept: for odometry sources that don't undistort.

@@ -122,6 +122,7 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
     navigator_.fly_to(request, odometry_, perception_.map_2d(), now_);
   }
   navigating_ = true;
+  perception_.note_flown(odometry_.X_OB.p);
   const TrajectorySetpoint setpoint =
       navigator_.update(perception_.grid(), perception_.map_2d(), odometry_, now_);
   for (const PlannerEvent& event : navigator_.take_events()) {

@@ -254,6 +254,30 @@ TEST(ExplorationSpace, LeavesAPocketByTheWayThatItCame) {
   EXPECT_NEAR(space.travel_distance({20, 28}), 3.0, 1e-9);
 }
 
+TEST(ExplorationSpace, TheNearestClearingIsThatOfBruteForce) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    RandomStream random(seed, "clearing");
+    const OccupancyMap2D map = test::random_map(70, 50, random);
+    const ExplorationSpace space(map, wide(), {}, random_in(map, random));
+    for (const double clearance : {0.0, 0.6, 1.0, 9.0}) {
+      double best = ExplorationSpace::kUnreachable;
+      for (int y = 0; y < map.height; ++y) {
+        for (int x = 0; x < map.width; ++x) {
+          if (map.at({x, y}) != OccupancyMap2D::kFree) continue;
+          if (space.clearance({x, y}) < clearance) continue;
+          best = std::min(best, space.travel_distance({x, y}));
+        }
+      }
+      const auto found = space.nearest_clearing(clearance);
+      ASSERT_EQ(found.has_value(), best < ExplorationSpace::kUnreachable);
+      if (!found) continue;
+      EXPECT_EQ(space.travel_distance(map.cell_of(*found)), best);
+      EXPECT_GE(space.clearance(map.cell_of(*found)), clearance);
+      EXPECT_TRUE(space.is_free(map.cell_of(*found)));
+    }
+  }
+}
+
 TEST(ExplorationSpace, AWayThatLeadsNowhereClearIsNoStart) {
   // Just taken off: nothing is known but that it stands here.
   OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kUnknown);

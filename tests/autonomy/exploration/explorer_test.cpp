@@ -290,6 +290,22 @@ TEST(Explorer, WaitsWhileItKnowsNothing) {
   EXPECT_EQ(explorer.decide(map, ExplorerInput{}).kind, DecisionKind::kWait);
 }
 
+TEST(Explorer, NamesAClearingToLandOnWhereItDoesNotComeHome) {
+  for (const bool home : {true, false}) {
+    Hall hall;
+    test::fill(hall.map, {150, 1}, {198, 78}, OccupancyMap2D::kFree);
+    hall.config.stop.return_home = home;
+    hall.input.p_OB = {-9.4, 0.2, 1.5};  // half a metre from the wall
+    const Decision d = Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
+    ASSERT_EQ(d.kind, DecisionKind::kStop);
+    EXPECT_EQ(d.landing_O.has_value(), !home);
+    if (!d.landing_O) continue;
+    EXPECT_NEAR(d.landing_O->x(), -10 + 0.05 + hall.config.stop.landing_clearance_m, 0.051);
+    EXPECT_NEAR(d.landing_O->y(), 0.2, 0.051);
+    EXPECT_EQ(d.landing_O->z(), hall.config.flight_height_m);
+  }
+}
+
 TEST(Explorer, FliesAtItsHeightAboveTheGroundOfTheGoal) {
   for (const bool follows : {true, false}) {
     Hall hall;

@@ -219,7 +219,7 @@ void Mission::fly_home(const Inputs& inputs) {
       events_(EventKind::kRecovery, "another way home");
       request_.attempt = returns_;
     } else {
-      stuck_ = inputs.cause;
+      if (config_.land_at_start) stuck_ = inputs.cause;  // else here is as good
       enter(MissionState::kLand, inputs);
     }
   }

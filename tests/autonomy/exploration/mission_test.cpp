@@ -117,20 +117,22 @@ TEST(Mission, LandsWhereItIsWithoutAClearing) {
   EXPECT_EQ(std::count(pilot.states.begin(), pilot.states.end(), "return"), 0);
 }
 
-TEST(Mission, LandsWhereItIsWhenNoWayLeadsHome) {
-  MissionConfig config = exploration(true);
-  config.return_tries = 3;
-  Pilot pilot(config);
-  explore(pilot, stop(std::nullopt));
-  pilot.progress = MotionProgress::kFailed;
-  pilot.step();  // asks for the way home
-  for (int attempt = 1; attempt < config.return_tries; ++attempt) {
-    pilot.step();
-    EXPECT_EQ(pilot.request.attempt, attempt);
+TEST(Mission, LandsWhereItIsWhenNoWayLeadsThere) {
+  for (const bool home : {true, false}) {
+    MissionConfig config = exploration(home);
+    config.return_tries = 3;
+    Pilot pilot(config);
+    explore(pilot, stop(Vec3(22, 4, 1.5)));
+    pilot.progress = MotionProgress::kFailed;
+    pilot.step();  // asks for the way
+    for (int attempt = 1; attempt < config.return_tries; ++attempt) {
+      pilot.step();
+      EXPECT_EQ(pilot.request.attempt, attempt);
+    }
+    pilot.fly(1);
+    EXPECT_EQ(pilot.landed_at, Vec2(20, 3));
+    EXPECT_EQ(pilot.mission.stuck(), home ? "no_path" : "");  // only home was asked for
   }
-  pilot.fly(1);
-  EXPECT_EQ(pilot.landed_at, Vec2(20, 3));
-  EXPECT_EQ(pilot.mission.stuck(), "no_path");
 }
 
 TEST(Mission, TellsTheExplorerOfATargetThatItCannotReach) {

@@ -13,7 +13,8 @@ constexpr int kMargin = 20;            ///< cells searched around map, start and
 constexpr std::size_t kMaxPull = 200;  ///< cells that one straight piece may replace
 constexpr double kBlocked = -1.0;
 
-/// The map grown by everything that the search may enter, as the cost of a metre in each cell.
+/// The map grown by everything that the search may enter, as the cost of a metre in each cell. Its
+/// outermost cells are blocked: every neighbour of a passable cell is in it.
 class CostMap {
  public:
   CostMap(const OccupancyMap2D& map, const Vec2& from, const Vec2& to, const GuideConfig& config)
@@ -30,10 +31,12 @@ class CostMap {
       for (int x = 0; x < size_.x(); ++x) {
         const Eigen::Vector2i cell = low_ + Eigen::Vector2i(x, y);
         const std::size_t i = index(cell);
-        const Vec2 centre = map.centre_of(cell);
-        const bool at_end = (centre - from).norm() <= near || (centre - to).norm() <= near;
         const double d = distance_[i] * map.resolution;
-        if (d <= 0 || (d < near && !at_end)) {
+        const auto at_end = [&, centre = map.centre_of(cell)] {
+          return (centre - from).norm() <= near || (centre - to).norm() <= near;
+        };
+        const bool at_edge = x == 0 || y == 0 || x == size_.x() - 1 || y == size_.y() - 1;
+        if (at_edge || d <= 0 || (d < near && !at_end())) {
           cost_[i] = kBlocked;
           continue;
         }
@@ -65,9 +68,12 @@ class CostMap {
     return low_ + Eigen::Vector2i(i % size_.x(), i / size_.x());
   }
   [[nodiscard]] bool passable(const Eigen::Vector2i& cell) const {
-    return contains(cell) && cost_[index(cell)] != kBlocked;
+    return contains(cell) && passable(index(cell));
   }
+  [[nodiscard]] bool passable(std::size_t index) const { return cost_[index] != kBlocked; }
   [[nodiscard]] double cost(std::size_t index) const { return cost_[index]; }
+  /// From a cell's index to that of the cell one row further on.
+  [[nodiscard]] std::ptrdiff_t row() const { return size_.x(); }
 
   /// Cost of the straight line between two points, infinite if it is blocked.
   [[nodiscard]] double line_cost(const Vec2& a, const Vec2& b) const {
@@ -87,33 +93,32 @@ class CostMap {
   void measure_distances() {
     const auto n = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y());
     distance_.assign(n, 1e9);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (map_.at(cell(i)) == OccupancyMap2D::kOccupied) distance_[i] = 0;
+    for (int y = 0; y < map_.height; ++y) {
+      for (int x = 0; x < map_.width; ++x) {
+        if (map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied) {
+          distance_[index({x, y})] = 0;
+        }
+      }
     }
-    const auto relax = [&](int x, int y, int dx, int dy, double step) {
-      if (x + dx < 0 || x + dx >= size_.x() || y + dy < 0 || y + dy >= size_.y()) return;
-      const auto w = static_cast<std::size_t>(size_.x());
-      double& d = distance_[static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x)];
-      d = std::min(
-          d,
-          step +
-              distance_[static_cast<std::size_t>(y + dy) * w + static_cast<std::size_t>(x + dx)]);
+    // Of a row first what the row before it says, which the compiler turns into vector code, then
+    // what its own cells say one after the other.
+    const auto w = static_cast<std::size_t>(size_.x());
+    const auto h = static_cast<std::size_t>(size_.y());
+    const auto take_row = [&](double* row, const double* before) {
+      for (std::size_t x = 1; x + 1 < w; ++x) {
+        const double diagonal = std::min(before[x - 1], before[x + 1]) + M_SQRT2;
+        row[x] = std::min(row[x], std::min(before[x] + 1.0, diagonal));
+      }
     };
-    for (int y = 0; y < size_.y(); ++y) {
-      for (int x = 0; x < size_.x(); ++x) {
-        relax(x, y, -1, 0, 1.0);
-        relax(x, y, 0, -1, 1.0);
-        relax(x, y, -1, -1, M_SQRT2);
-        relax(x, y, 1, -1, M_SQRT2);
-      }
+    for (std::size_t y = 1; y < h; ++y) {
+      double* const row = distance_.data() + y * w;
+      take_row(row, row - w);
+      for (std::size_t x = 1; x < w; ++x) row[x] = std::min(row[x], row[x - 1] + 1.0);
     }
-    for (int y = size_.y() - 1; y >= 0; --y) {
-      for (int x = size_.x() - 1; x >= 0; --x) {
-        relax(x, y, 1, 0, 1.0);
-        relax(x, y, 0, 1, 1.0);
-        relax(x, y, 1, 1, M_SQRT2);
-        relax(x, y, -1, 1, M_SQRT2);
-      }
+    for (std::size_t y = h - 1; y-- > 0;) {
+      double* const row = distance_.data() + y * w;
+      take_row(row, row + w);
+      for (std::size_t x = w - 1; x-- > 0;) row[x] = std::min(row[x], row[x + 1] + 1.0);
     }
   }
 
@@ -165,8 +170,9 @@ GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to
   using Entry = std::pair<double, std::size_t>;  // ties by index
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   cost[source] = 0;
-  open.push({remaining(costs.cell(source)), source});
   std::size_t nearest = source;
+  double least = remaining(costs.cell(source));
+  open.push({least, source});
   while (!open.empty() && result.expansions < config.max_expansions) {
     const std::size_t node = open.top().second;
     open.pop();
@@ -174,25 +180,31 @@ GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to
     closed[node] = true;
     ++result.expansions;
     const Eigen::Vector2i cell = costs.cell(node);
-    if (remaining(cell) < remaining(costs.cell(nearest))) nearest = node;
+    if (const double left = remaining(cell); left < least) {
+      least = left;
+      nearest = node;
+    }
     if (node == goal) break;
+    const auto beside = [&](std::ptrdiff_t offset) {
+      return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(node) + offset);
+    };
     for (int k = 0; k < 9; ++k) {
       const Eigen::Vector2i step(k / 3 - 1, k % 3 - 1);
-      const Eigen::Vector2i next = cell + step;
-      if (k == 4 || !costs.passable(next)) continue;
-      if (!costs.passable({cell.x() + step.x(), cell.y()}) ||
-          !costs.passable({cell.x(), cell.y() + step.y()})) {
-        // The start's own cell may be blocked; it is only left, never passed by.
-        if (step.x() != 0 && step.y() != 0) continue;
+      const std::size_t there = beside(step.y() * costs.row() + step.x());
+      if (k == 4 || closed[there] || !costs.passable(there)) continue;
+      const bool diagonal = step.x() != 0 && step.y() != 0;
+      // The start's own cell may be blocked; it is only left, never passed by.
+      if (diagonal &&
+          (!costs.passable(beside(step.x())) || !costs.passable(beside(step.y() * costs.row())))) {
+        continue;
       }
-      const std::size_t there = costs.index(next);
-      const double length = map.resolution * step.cast<double>().norm();
+      const double length = map.resolution * (diagonal ? M_SQRT2 : 1.0);
       const double here = std::max(1.0, costs.cost(node));
       const double through = cost[node] + length * 0.5 * (here + costs.cost(there));
       if (through >= cost[there]) continue;
       cost[there] = through;
       parent[there] = static_cast<std::int32_t>(node);
-      open.push({through + remaining(next), there});
+      open.push({through + remaining(cell + step), there});
     }
   }
   const bool found = closed[goal];

@@ -21,8 +21,8 @@ struct ImuNoiseConfig {
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
     f("gyro_noise_density", gyro_noise_density,
       "rad/s/sqrt(Hz): half as much again as the white noise of the sensor (reference.md, 4), for "
-      "aliased "
-      "vibration; more lets scans of a small scene tilt a vehicle that stands still");
+      "aliased vibration; more lets scans of a small scene tilt a vehicle that stands still. A "
+      "start that measures more noise than this raises it and the walk's by the same factor");
     f("gyro_scale_noise_density", gyro_scale_noise_density,
       "1/sqrt(Hz), times the rate: errors of scale and alignment");
     f("accel_noise_density", accel_noise_density,
@@ -47,6 +47,7 @@ struct StaticInitialiserConfig {
   double max_gyro_mean_radps = 0.1;
   double still_rate_radps = 0.005;
   double still_force_mps2 = 0.1;
+  double still_sigma = 4;
   double gyro_bias_std_radps = 1e-4;
   double accel_bias_std_mps2 = 0.05;
   double gravity_std_mps2 = 0.005;
@@ -60,6 +61,7 @@ struct StaticInitialiserConfig {
       "after the start, a scan's mean rate below this is still standstill, as far as force allows");
     f("still_force_mps2", still_force_mps2,
       "and its mean specific force changed by less than this");
+    f("still_sigma", still_sigma, "beside so many sigma of the white noise in these means");
     f("gyro_bias_std_radps", gyro_bias_std_radps,
       "1 sigma of what changes it later, beside the noise of the mean");
     f("accel_bias_std_mps2", accel_bias_std_mps2,

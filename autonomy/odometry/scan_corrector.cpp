@@ -19,6 +19,18 @@ std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoi
   return fractions;
 }
 
+/// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
+/// of a worse grade, and its bias, which standing for a second cannot tell, wanders in proportion.
+ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured) {
+  const double gyro = std::max(1.0, measured.gyro / imu.gyro_noise_density);
+  const double accel = std::max(1.0, measured.accel / imu.accel_noise_density);
+  imu.gyro_noise_density *= gyro;
+  imu.gyro_walk_density *= gyro;
+  imu.accel_noise_density *= accel;
+  imu.accel_walk_density *= accel;
+  return imu;
+}
+
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -73,6 +85,9 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
     forget_imu_before(window_begin - from_seconds(0.2));
     return;
   }
+  white_noise_ = start->white_noise;
+  config_.imu = graded(config_.imu, white_noise_);
+  filter_ = ErrorStateFilter(config_.imu);
   filter_.reset(start->state, start->covariance);
   accel_scale_ = start->accel_scale;
   stamp_ = correction_stamp_ = scan->end;
@@ -145,7 +160,7 @@ void ScanCorrector::hold_standstill(Stamp until) {
   const auto begin = std::upper_bound(imu_.begin(), imu_.end(), stamp_, after);
   const auto end = std::upper_bound(begin, imu_.end(), until, after);
   const NavigationState& x = filter_.state();
-  if (!stands_still({begin, end}, x, accel_scale_, config_.initialiser)) {
+  if (!stands_still({begin, end}, x, accel_scale_, config_.initialiser, white_noise_)) {
     stood_at_.reset();
     return;
   }

@@ -71,6 +71,7 @@ class ScanCorrector {
   GyroCompletion gyro_;
   std::vector<ImuSample> imu_;
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
+  WhiteNoise white_noise_;                    ///< of the IMU, measured at the start
   std::optional<Pose> stood_at_;              ///< X_OB, until it moves for the first time
   Stamp stamp_ = 0;                           ///< of the filter's state
   Stamp correction_stamp_ = 0;

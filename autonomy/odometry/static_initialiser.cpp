@@ -73,6 +73,25 @@ Mat3 level(const Vec3& f_B) {
 
 }  // namespace
 
+WhiteNoise white_noise(std::span<const ImuSample> samples) {
+  constexpr std::size_t kBlock = 5;  // 25 ms at 200 Hz: some time constants of the filters
+  const std::size_t blocks = samples.size() / kBlock;
+  if (blocks < 2) return {};
+  const auto block = [&](std::size_t b) { return moments(samples.subspan(b * kBlock, kBlock)); };
+  double gyro = 0, accel = 0;
+  for (std::size_t b = 1; b < blocks; ++b) {
+    const Moments before = block(b - 1), after = block(b);
+    gyro += (after.gyro_mean - before.gyro_mean).squaredNorm();
+    accel += (after.accel_mean - before.accel_mean).squaredNorm();
+  }
+  // White noise: the variance of a mean, times its time.
+  const double period_s = to_seconds(samples.back().stamp - samples.front().stamp) /
+                          static_cast<double>(samples.size() - 1);
+  const double axes = 3, differences = static_cast<double>(blocks - 1);
+  const double share = kBlock * period_s / (2 * axes * differences);
+  return {std::sqrt(gyro * share), std::sqrt(accel * share)};
+}
+
 std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samples,
                                                  const Pose& X_BL,
                                                  const LidarInertialConfig& config) {
@@ -118,18 +137,23 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
                     Eigen::Matrix<double, 1, 1>(std::pow(sc.gravity_std_mps2, 2)));
   start.state = filter.state();
   start.covariance = filter.covariance();
+  start.white_noise = white_noise(window);
   if (config.estimate_extrinsics) doubt_mounting(config, start.state, start.covariance);
   return start;
 }
 
 bool stands_still(std::span<const ImuSample> samples, const NavigationState& x, double accel_scale,
-                  const StaticInitialiserConfig& config) {
-  if (samples.empty()) return false;
+                  const StaticInitialiserConfig& config, const WhiteNoise& noise) {
+  if (samples.size() < 2) return false;
   const Moments m = moments(samples);
+  // A mean over less time is noisier.
+  const double reach =
+      config.still_sigma / std::sqrt(to_seconds(samples.back().stamp - samples.front().stamp));
   const Vec3 rate = m.gyro_mean - x.b_g;
   const Vec3 force = accel_scale * m.accel_mean - (x.b_a - x.R_OB.transpose() * x.g_O);
   return m.gyro_std < config.max_gyro_std_radps && m.accel_std < config.max_accel_std_mps2 &&
-         rate.norm() < config.still_rate_radps && force.norm() < config.still_force_mps2;
+         rate.norm() < std::hypot(config.still_rate_radps, reach * noise.gyro) &&
+         force.norm() < std::hypot(config.still_force_mps2, reach * noise.accel);
 }
 
 }  // namespace arex

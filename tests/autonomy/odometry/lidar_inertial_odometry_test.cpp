@@ -159,6 +159,47 @@ TEST(StaticInitialiser, WaitsWhileItIsShakenOrTurned) {
   EXPECT_FALSE(start_from_standstill({}, mounting(), config));
 }
 
+TEST(StaticInitialiser, MeasuresTheWhiteNoise) {
+  // 39 differences of 3 axes, neighbours correlated: 8 % of spread; four times that is allowed.
+  constexpr double kGyro = 5e-4, kAccel = 7e-3, kSamplePeriod = 1e-9 * kPeriod;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    RandomStream random(seed, "white");
+    std::vector<ImuSample> samples(200);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      samples[i].stamp = static_cast<Stamp>(i) * kPeriod;
+      samples[i].gyro_radps =
+          Vec3(0.01, -0.02, 0.03) + kGyro / std::sqrt(kSamplePeriod) * random.normal3();
+      samples[i].accel_mps2 =
+          Vec3(0.1, 0, kGravity) + kAccel / std::sqrt(kSamplePeriod) * random.normal3();
+    }
+    const WhiteNoise measured = white_noise(samples);
+    EXPECT_NEAR(measured.gyro / kGyro, 1, 0.32);
+    EXPECT_NEAR(measured.accel / kAccel, 1, 0.32);
+  }
+  EXPECT_EQ(white_noise({}).gyro, 0);
+}
+
+// The noise of a bad IMU is not taken for motion: the start stays where it is.
+TEST(LidarInertialOdometry, StandsStillWithANoisyImu) {
+  test::SensorNoise noise;
+  noise.imu = 5;
+  noise.vibration = 0;  // before take-off
+  noise.extra_range_m = 0.02;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Recording r =
+        record(test::AnalyticWorld::hall(), {{Vec4::Zero()}, 1, 100}, 5, noise, seed, 16);
+    const Flown run = fly(r);
+    std::optional<NavigationState> start;
+    for (const ScanUpdate& u : run.updates) {
+      if (u.status == OdometryStatus::kInitialising) continue;
+      if (!start) start = u.state;
+      EXPECT_LT(so3::angle(start->R_OB.transpose() * u.state.R_OB), 1e-4);
+      EXPECT_LT((u.state.p_OB - start->p_OB).norm(), 1e-3);
+    }
+    EXPECT_TRUE(start);
+  }
+}
+
 TEST(LidarInertialOdometry, FollowsAFlightThroughAForest) {
   const Flown run = fly(forest());
   EXPECT_LT(worst_error(forest(), run), 0.03);
@@ -202,25 +243,24 @@ std::vector<Fired> fired(const Recording& r, const ScanUpdate& update) {
   return out;
 }
 
-// Beside the noise of the points, placed from the true pose at their time, there is the drift of a
-// lap from the start: 2 cm and 1 mrad at 10 m.
+// O is level by the accelerometer, whose bias (3 and 4 cm/s^2) tilts it by 5 mrad: that is where
+// the map is, not how good. So it is placed by the pose at the start, as a flight's error is.
 TEST(LidarInertialOdometry, PointsLieOnTheSurfaces) {
   const Flown run = fly(forest());
-  std::vector<double> errors, least;
+  std::vector<double> errors;
+  std::optional<Pose> X_WO;
   for (const ScanUpdate& u : run.updates) {
-    const std::vector<Fired> shots = fired(forest(), u);
+    if (u.status == OdometryStatus::kInitialising) continue;
+    if (!X_WO) X_WO = forest().motion.at(to_seconds(u.stamp)).X_OB * u.state.X_OB().inverse();
     for (std::size_t i = 0; i < u.points_O->size(); i += 37) {
-      errors.push_back(forest().world.distance((*u.points_O)[i].cast<double>()));
-      const Pose X_OL = forest().motion.at(shots[i].t_s).X_OB * mounting();
-      least.push_back(forest().world.distance(X_OL * shots[i].raw->p_L.cast<double>()));
+      errors.push_back(forest().world.distance(*X_WO * (*u.points_O)[i].cast<double>()));
     }
   }
   ASSERT_GT(errors.size(), 1000U);
   std::sort(errors.begin(), errors.end());
-  std::sort(least.begin(), least.end());
   const std::size_t p50 = errors.size() / 2, p95 = errors.size() * 95 / 100;
   EXPECT_LT(errors[p50], 0.015);
-  EXPECT_LT(errors[p95], least[p95] + 0.03);
+  EXPECT_LT(errors[p95], 0.05);
 }
 
 TEST(LidarInertialOdometry, HoldsStillOnAStaticVehicle) {

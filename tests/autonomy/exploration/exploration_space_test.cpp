@@ -228,7 +228,9 @@ TEST(ExplorationSpace, TheWayThatTheVehicleCameStaysOpen) {
     const ExplorationSpace space(map, wide(), {}, map.centre_of({45, 30}));
     EXPECT_TRUE(space.is_reachable({55, 10}));
     EXPECT_EQ(space.is_reachable({5, 50}), flown);
-    if (flown) EXPECT_NEAR(space.travel_distance({10, 30}), 3.5, 1e-9);
+    if (flown) {
+      EXPECT_NEAR(space.travel_distance({10, 30}), 3.5, 1e-9);
+    }
     // A way is no free space: nothing is seen across the wall, and the unknown beside the way is no
     // frontier of the way's own cells.
     EXPECT_FALSE(space.is_free({30, 30}));

@@ -118,7 +118,9 @@ TEST(GuidePath, LeavesAPocketByTheWayThatItCame) {
   const GuidePath path = plan_guide(map, map.centre_of({70, 50}), {15, 5}, {});
   EXPECT_EQ(path.status, GuideStatus::kFound);
   for (const Vec2& p : path.points) {
-    if (p.y() > 2 && p.y() < 8 && p.x() < 12) EXPECT_NEAR(p.x(), 7.05, 1e-9);
+    if (p.y() > 2 && p.y() < 8 && p.x() < 12) {
+      EXPECT_NEAR(p.x(), 7.05, 1e-9);
+    }
   }
 }
 

@@ -190,6 +190,7 @@ void Explorer::set_goal(Decision& decision, const OccupancyMap2D& map) const {
 }
 
 Vec3 Explorer::at_flight_height(const Vec2& place, const OccupancyMap2D& map) const {
+  // Ground is known wherever a column is known free, which all that is flown to is.
   const double ground = config_.follow_ground ? map.ground.at(place) : 0.0;
   return {place.x(), place.y(), config_.flight_height_m + (std::isfinite(ground) ? ground : 0.0)};
 }

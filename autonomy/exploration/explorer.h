@@ -40,7 +40,7 @@ struct ExplorerConfig {
     f("viewpoint", viewpoint, "from where a frontier is to be seen");
     f("stop", stop, "stop criteria");
     f("consumption", consumption, "battery and power as believed");
-    f("flight_height_m", flight_height_m, "z of the goals in O");
+    f("flight_height_m", flight_height_m, "height of the goals");
     f("follow_ground", follow_ground,
       "flight_height_m counts from the mapped ground under a goal; false: from O's origin");
     f("reevaluate", reevaluate, "drop a target whose unknown area was seen from afar");
@@ -107,7 +107,7 @@ struct Decision {
   /// Of a stop for want of candidates: the largest f_I of all frontiers that the exhaustive search
   /// still reaches, whatever the filters and the blacklist made of them.
   std::optional<double> open_frontier_m2;
-  /// Of a stop that does not lead home: above the nearest place to land; none was found without.
+  /// Of a stop that does not lead home: above the nearest clearing; none if none is reachable.
   std::optional<Vec3> landing_O;
   double home_distance_m = 0;  ///< along the known path
   EnergyBalance energy;

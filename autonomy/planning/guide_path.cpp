@@ -101,7 +101,7 @@ class CostMap {
       }
     }
     // Of a row first what the row before it says, which the compiler turns into vector code, then
-    // what its own cells say one after the other.
+    // what its own cells say one after the other. The outermost columns are blocked anyway.
     const auto w = static_cast<std::size_t>(size_.x());
     const auto h = static_cast<std::size_t>(size_.y());
     const auto take_row = [&](double* row, const double* before) {

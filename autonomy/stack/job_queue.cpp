@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 namespace arex {
@@ -47,9 +48,11 @@ void JobQueue::drain() {
   }
 }
 
-JobQueue::Lane JobQueue::add_lane(std::string name) {
+JobQueue::Lane JobQueue::add_lane(std::string name, Order order) {
   const std::lock_guard lock(mutex_);
-  lanes_.emplace_back().name = std::move(name);
+  LaneState& lane = lanes_.emplace_back();
+  lane.name = std::move(name);
+  lane.order = order;
   return lanes_.size() - 1;
 }
 
@@ -132,31 +135,35 @@ void JobQueue::execute(Job& job) {
 void JobQueue::run_one(std::unique_lock<std::mutex>& lock, Lane lane) {
   const JobPtr job = lanes_[lane].waiting.front();
   lanes_[lane].waiting.pop_front();
-  lanes_[lane].running = true;
+  ++lanes_[lane].running;
   lock.unlock();
   execute(*job);
   lock.lock();
-  lanes_[lane].running = false;  // lanes_ may have grown meanwhile: no reference is kept
+  --lanes_[lane].running;  // lanes_ may have grown meanwhile: no reference is kept
   lanes_[lane].seconds.push_back(job->seconds);
+  lanes_[lane].sum_s += static_cast<double>(job->seconds);
   job->done = true;
   job_done_.notify_all();
   if (!lanes_[lane].waiting.empty()) work_available_.notify_one();
 }
 
-// The lane whose next job will be waited for first.
-std::optional<JobQueue::Lane> JobQueue::next_lane() const {
+// The lane whose next job will be waited for first, of those whose jobs are no longer than that.
+std::optional<JobQueue::Lane> JobQueue::next_lane(double longest_s) const {
   const auto next = std::find_if(pending_.begin(), pending_.end(), [&](const JobPtr& job) {
     const LaneState& lane = lanes_[job->lane];
-    return !lane.running && !lane.waiting.empty() && lane.waiting.front() == job;
+    const bool open = lane.running == 0 || lane.order == Order::kSideBySide;
+    return open && !lane.waiting.empty() && lane.waiting.front() == job &&
+           lane.mean_s() <= longest_s;
   });
   return next == pending_.end() ? std::nullopt : std::optional((*next)->lane);
 }
 
 // Waits for the first of the pending jobs. The caller's thread is one of the host threads: while
-// another one runs that job it takes the next.
+// another one runs that job it takes the next, but none that is longer: the flight goes on when the
+// job is done, and with it the work for all threads.
 void JobQueue::finish(std::unique_lock<std::mutex>& lock, const Job& job) {
   while (!job.done) {
-    if (const auto lane = next_lane()) {
+    if (const auto lane = next_lane(lanes_[job.lane].mean_s())) {
       run_one(lock, *lane);
     } else {
       job_done_.wait(lock);
@@ -167,7 +174,7 @@ void JobQueue::finish(std::unique_lock<std::mutex>& lock, const Job& job) {
 void JobQueue::run_worker() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
-    if (const auto lane = next_lane()) {
+    if (const auto lane = next_lane(std::numeric_limits<double>::infinity())) {
       run_one(lock, *lane);
     } else {
       work_available_.wait(lock);

@@ -42,7 +42,10 @@ class JobQueue {
   /// Runs every job that was begun or waits, and drops the results: the end of a flight.
   void drain();
 
-  Lane add_lane(std::string name);
+  /// How a lane's jobs run on the host: each after the one before, or, where they share nothing
+  /// that changes, as many at a time as there are threads. What they deliver comes in order anyway.
+  enum class Order { kOneByOne, kSideBySide };
+  Lane add_lane(std::string name, Order order = Order::kOneByOne);
 
   /// Starts `work` at `now` or when the lane is free. @return the stamp at which it becomes
   /// visible.
@@ -83,16 +86,21 @@ class JobQueue {
   using JobPtr = std::shared_ptr<Job>;
   struct LaneState {
     std::string name;
+    Order order = Order::kOneByOne;
     Stamp free_at = 0;
     std::deque<JobPtr> waiting;  ///< not yet run, in order
-    bool running = false;
+    int running = 0;
     std::vector<float> seconds;
+    double sum_s = 0;
+    [[nodiscard]] double mean_s() const {
+      return seconds.empty() ? 0 : sum_s / static_cast<double>(seconds.size());
+    }
   };
 
   void enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visible_at, Work work);
   static void execute(Job& job);
   void run_one(std::unique_lock<std::mutex>& lock, Lane lane);
-  [[nodiscard]] std::optional<Lane> next_lane() const;
+  [[nodiscard]] std::optional<Lane> next_lane(double longest_s) const;
   void finish(std::unique_lock<std::mutex>& lock, const Job& job);
   void run_worker();
 

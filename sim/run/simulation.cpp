@@ -1,6 +1,7 @@
 #include "run/simulation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -51,6 +52,37 @@ std::uint64_t hash_of(const DepthImage& image) {
 
 }  // namespace
 
+/// A frame of the LiDAR in the making: its parts are cast in any order, the last one joins them.
+struct Simulation::LidarFrame {
+  explicit LidarFrame(std::int64_t count)
+      : parts(static_cast<std::size_t>(count)),
+        missing(count),
+        scan(std::make_shared<LidarScan>()) {}
+
+  void add(std::size_t part, LidarScan points) {
+    parts[part] = std::move(points);
+    if (--missing == 0) join();
+  }
+
+  void join() {
+    scan->stamp = parts.front().stamp;
+    scan->end = parts.back().end;
+    for (LidarScan& part : parts) {
+      const auto offset = static_cast<std::uint32_t>(part.stamp - scan->stamp);
+      for (LidarPoint point : std::exchange(part.points, {})) {
+        point.offset_ns += offset;
+        scan->points.push_back(point);
+      }
+    }
+    hash = hash_of(*scan);
+  }
+
+  std::vector<LidarScan> parts;
+  std::atomic<std::int64_t> missing;
+  std::shared_ptr<LidarScan> scan;
+  std::uint64_t hash = 0;
+};
+
 void ExplorationLog::add(const Decision& decision) {
   ++decisions;
   if (decision.kind == DecisionKind::kNewTarget) {
@@ -65,7 +97,7 @@ void ExplorationLog::add(const Decision& decision) {
 Simulation::Simulation(const Scenario& scenario, int threads)
     : config_(scenario.config),
       world_(scenario.build_world()),
-      scene_(world_),
+      scene_(world_, threads > 1 ? Scene::Build::kBeside : Scene::Build::kNow),
       physics_(config_.physics, world_, start_pose(world_, config_.stack.vehicle), config_.seed),
       imu_(config_.imu, config_.seed),
       lidar_(config_.lidar, scene_, physics_.airframe().X_BL,
@@ -75,7 +107,7 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
               ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
       jobs_(threads),
-      lidar_lane_(jobs_.add_lane("lidar")),
+      lidar_lane_(jobs_.add_lane("lidar", JobQueue::Order::kSideBySide)),
       depth_lane_(jobs_.add_lane("depth")),
       stack_(config_.stack, jobs_, config_.seed) {
   if (config_.stack.mission.kind != MissionConfig::Kind::kExplore) return;
@@ -125,34 +157,26 @@ void Simulation::fire_imu() {
 void Simulation::fire_lidar() {
   if (!config_.devices.lidar) return;
   lidar_part_.push_back(physics_.truth());
-  if (now_ == 0 || now_ % kLidarPart != 0) return;
-  // The parts of a frame are cast while the next ones are fired; all become visible with the frame.
-  const Stamp period = from_seconds(1 / config_.lidar.rate_hz);
+  // The parts of a frame are cast while the next ones are fired, side by side; all become visible
+  // with the frame.
+  const Stamp period = config_.lidar.period();
   const Stamp begin = lidar_part_.front().stamp;
   const Stamp frame_begin = begin / period * period;
   const Stamp frame_end = frame_begin + period;
-  if (begin == frame_begin) {
-    lidar_frame_ = std::make_shared<LidarScan>();
-    lidar_frame_->stamp = frame_begin;
-    lidar_frame_->end = frame_end;
-  }
-  const bool complete = now_ == frame_end;
-  jobs_.schedule(
-      lidar_lane_, frame_end + from_seconds(config_.devices.lidar_latency_s),
-      [this, ticks = lidar_part_, frame = lidar_frame_, complete]() -> JobQueue::Delivery {
-        const LidarScan part = lidar_.scan(ticks);
-        const auto offset = static_cast<std::uint32_t>(part.stamp - frame->stamp);
-        for (LidarPoint point : part.points) {
-          point.offset_ns += offset;
-          frame->points.push_back(point);
-        }
-        if (!complete) return nullptr;
-        return [this, frame, hash = hash_of(*frame)] {
-          sensor_hash_.add(hash);
-          stack_.add_scan(frame);
-          if (bag_) bag_->scan(*frame);
-        };
-      });
+  if (now_ < std::min(begin + kLidarPart, frame_end)) return;
+  const auto part = static_cast<std::size_t>((begin - frame_begin) / kLidarPart);
+  if (part == 0)
+    lidar_frame_ = std::make_shared<LidarFrame>((period + kLidarPart - 1) / kLidarPart);
+  jobs_.schedule(lidar_lane_, frame_end + from_seconds(config_.devices.lidar_latency_s),
+                 [this, ticks = lidar_part_, frame = lidar_frame_, part]() -> JobQueue::Delivery {
+                   frame->add(part, lidar_.scan(ticks));
+                   if (part + 1 < frame->parts.size()) return nullptr;
+                   return [this, frame] {
+                     sensor_hash_.add(frame->hash);
+                     stack_.add_scan(frame->scan);
+                     if (bag_) bag_->scan(*frame->scan);
+                   };
+                 });
   lidar_part_.assign(1, physics_.truth());
 }
 
@@ -163,13 +187,14 @@ void Simulation::fire_depth() {
   if (stamp > now_) return;
   ++depth_frame_;
   if (!stack_.accepts_depth(stamp)) return;
-  if (!camera_) {
-    camera_ = std::make_unique<D430>(config_.depth, world_, physics_.airframe().X_BC, config_.seed);
-  }
   const double fraction = now_ == stamp ? 1.0 : 1.0 - static_cast<double>(now_ - stamp) / kTick;
   const Pose X_WB = interpolate(previous_truth_.X_WB, physics_.truth().X_WB, fraction);
   jobs_.schedule(depth_lane_, stamp + from_seconds(config_.devices.depth_latency_s),
                  [this, stamp, X_WB]() -> JobQueue::Delivery {
+                   if (!camera_) {
+                     camera_ = std::make_unique<D430>(config_.depth, world_,
+                                                      physics_.airframe().X_BC, config_.seed);
+                   }
                    const DepthImagePtr frame = camera_->capture(stamp, X_WB);
                    return [this, frame, hash = hash_of(*frame)] {
                      sensor_hash_.add(hash);
@@ -320,8 +345,7 @@ FlightResult Simulation::finish() {
     if (recorder_) recorder_->write_cloud(cloud, cloud_growth_);
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
     // odometry's.
-    result.map =
-        score_map(cloud, align_map(result.flight.poses), world_, scene_, config_.scoring.map);
+    result.map = score_map(cloud, align_map(result.flight.poses), scene_, config_.scoring.map);
   }
   if (coverage_) result.coverage = coverage_->result();
   result.exploration = exploration_;

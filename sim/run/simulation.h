@@ -97,6 +97,7 @@ class Simulation {
   void note_cloud_growth();
   void score_coverage();
 
+  struct LidarFrame;
   struct Timers {
     StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
         recording{"recording"};
@@ -108,7 +109,7 @@ class Simulation {
   Physics physics_;
   ImuModel imu_;
   Mid360 lidar_;
-  std::unique_ptr<D430> camera_;  ///< made when the first frame is read
+  std::unique_ptr<D430> camera_;  ///< made when the first frame is read; in jobs of its lane
   Autopilot autopilot_;
   Recorder* recorder_ = nullptr;
   BagWriter* bag_ = nullptr;
@@ -118,9 +119,9 @@ class Simulation {
   std::string reason_;
   MotorCommand motors_;
   Truth previous_truth_;
-  std::vector<Truth> lidar_part_;           ///< ticks of the part being fired
-  std::shared_ptr<LidarScan> lidar_frame_;  ///< the frame being assembled
-  std::int64_t depth_frame_ = 0;            ///< index of the next frame
+  std::vector<Truth> lidar_part_;            ///< ticks of the part being fired
+  std::shared_ptr<LidarFrame> lidar_frame_;  ///< the frame being fired
+  std::int64_t depth_frame_ = 0;             ///< index of the next frame
 
   TrajectoryHash hash_;
   TrajectoryHash sensor_hash_;

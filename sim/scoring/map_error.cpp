@@ -8,21 +8,6 @@
 namespace arex::sim {
 namespace {
 
-using worlds::World;
-
-// The same world, foliage cut away; only what Scene reads.
-World without_foliage(const World& world) {
-  World bare;
-  bare.objects = world.objects;
-  bare.mesh.vertices = world.mesh.vertices;
-  for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
-    if (is_foliage(world.class_of_triangle(t))) continue;
-    bare.mesh.triangles.push_back(world.mesh.triangles[t]);
-    bare.mesh.object_of_triangle.push_back(world.mesh.object_of_triangle[t]);
-  }
-  return bare;
-}
-
 // One index from each of `count` equal parts of [0, size): even over the cloud, whatever its order,
 // and without the beat of a fixed stride.
 std::vector<std::size_t> choose(std::size_t size, std::size_t count) {
@@ -44,22 +29,20 @@ double quantile(std::vector<double>& values, double fraction) {
 
 }  // namespace
 
-MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const World& world,
-                   const Scene& scene, const MapErrorConfig& config) {
+MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const Scene& scene,
+                   const MapErrorConfig& config) {
   MapScore score;
   score.points = cloud_O.size();
-  const World bare = without_foliage(world);
-  const Scene solid(bare);
   std::vector<double> distances;
   std::size_t outliers = 0;
   for (const std::size_t i : choose(cloud_O.size(), static_cast<std::size_t>(config.max_points))) {
     const Vec3 p_W = X_WO * cloud_O[i].cast<double>();
     const double distance =
-        scene.distance_to_surface(p_W, config.max_distance_m, Scene::Surfaces::kAll);
+        scene.distance_to_surface(p_W, config.max_distance_m, worlds::ClassSet::all());
     if (distance <= config.foliage_m) {
       // A hair further, so that the solid surface that is itself the nearest is found.
       const double limit = distance + 1e-6;
-      if (solid.distance_to_surface(p_W, limit, Scene::Surfaces::kAll) >= limit) {
+      if (scene.distance_to_surface(p_W, limit, kWithoutFoliage) >= limit) {
         ++score.foliage;
         continue;
       }

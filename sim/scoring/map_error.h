@@ -38,10 +38,10 @@ struct MapScore {
   double outlier_fraction = 0;  ///< share further than outlier_m
 };
 
-/// Leaves, shrubs and ferns: not a surface to be mapped.
-constexpr bool is_foliage(worlds::SurfaceClass c) {
-  return c == worlds::SurfaceClass::kLeaf || c == worlds::SurfaceClass::kShrub;
-}
+/// Surfaces to be mapped: all but leaves, shrubs and ferns.
+inline constexpr worlds::ClassSet kWithoutFoliage = worlds::ClassSet::all()
+                                                        .without(worlds::SurfaceClass::kLeaf)
+                                                        .without(worlds::SurfaceClass::kShrub);
 
 /// Exact distances of a cloud's points to the nearest true triangle, foliage included: a map point
 /// on a leaf is no error of the map. Points that foliage explains (nearer to it than to any solid
@@ -49,8 +49,7 @@ constexpr bool is_foliage(worlds::SurfaceClass c) {
 /// crown is near, do not flatter the figures. A point in mid-air is not excused by the leaf that
 /// happens to be nearest: beyond foliage_m it counts.
 /// @param cloud_O the map's points in O, m; @param X_WO O in W, usually aligned at the start
-/// @param scene of `world`
-MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const worlds::World& world,
-                   const Scene& scene, const MapErrorConfig& config = {});
+MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const Scene& scene,
+                   const MapErrorConfig& config = {});
 
 }  // namespace arex::sim

@@ -112,7 +112,7 @@ std::vector<SurfaceSample> sample_surfaces(const World& world, const Bounds& reg
   std::size_t stratum = 0;
   for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
     const SurfaceClass surface_class = world.class_of_triangle(t);
-    if (is_foliage(surface_class)) continue;
+    if (!kWithoutFoliage.contains(surface_class)) continue;
     const Corners v = corners_of(world, t);
     const Vec3 cross = (v[1] - v[0]).cross(v[2] - v[0]);
     const double area_after = area_before + 0.5 * cross.norm() / config.sample_area_m2;

@@ -16,7 +16,7 @@
 namespace arex::sim {
 
 struct Mid360Config {
-  double rate_hz = 10;  ///< frames (datasheet)
+  double rate_hz = 10;  ///< frames (datasheet); a whole number of ticks each
   PatternMode pattern = PatternMode::kDevice;
   bool noise_free = false;
   EchoConfig echo;
@@ -35,6 +35,8 @@ struct Mid360Config {
   double fault_false_burst_from_s = 0;
   double fault_false_burst_for_s = 0;
   double fault_false_burst_fraction = 0.1;
+
+  [[nodiscard]] Stamp period() const { return from_seconds(1 / rate_hz); }  ///< of a frame
 
   void fields(auto& f) {
     f("rate_hz", rate_hz, "frames (datasheet)");
@@ -57,7 +59,8 @@ struct Mid360Config {
     f("fault_false_burst_from_s", fault_false_burst_from_s, "start of a burst of false returns");
     f("fault_false_burst_for_s", fault_false_burst_for_s, "length of that burst");
     f("fault_false_burst_fraction", fault_false_burst_fraction, "share of false returns in it");
-    f.check(rate_hz > 0, "rate_hz > 0");
+    f.check(rate_hz > 0 && period() > 0 && period() % kNanosecondsPerTick == 0,
+            "1 / rate_hz a whole number of milliseconds");
     f.check(beam_half_angle_deg >= 0 && beam_half_angle_deg < 5, "0 <= beam_half_angle_deg < 5");
     f.check(echo_separation_m >= 0, "echo_separation_m >= 0");
     f.check(merged_share >= 0 && merged_share <= 1, "0 <= merged_share <= 1");

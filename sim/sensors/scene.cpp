@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <future>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -62,6 +63,8 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
 struct NearestQuery {
   Vec3 p_W;
   double best_m;
+  worlds::ClassSet classes;
+  const worlds::SurfaceClass* class_of_triangle;
   const Vec3f* vertices;
   const Triangle* triangles;
 };
@@ -69,6 +72,7 @@ struct NearestQuery {
 /// Embree calls this for every triangle whose bounds reach into the query's sphere.
 bool visit_triangle(RTCPointQueryFunctionArguments* args) {
   auto& nearest = *static_cast<NearestQuery*>(args->userPtr);
+  if (!nearest.classes.contains(nearest.class_of_triangle[args->primID])) return false;
   const Triangle& t = nearest.triangles[args->primID];
   const Vec3 a = nearest.vertices[t[0]].cast<double>();
   const Vec3 b = nearest.vertices[t[1]].cast<double>();
@@ -89,15 +93,15 @@ void fail_loudly(void*, RTCError, const char* message) {
 
 struct Scene::Embree {
   RTCDevice device = nullptr;
-  RTCScene all = nullptr;             ///< every triangle, for rays
-  RTCScene without_leaves = nullptr;  ///< for distances
   RTCBuffer vertex_buffer = nullptr;
   std::vector<Facet> facets;  ///< one per triangle of the mesh
   const Vec3f* vertices = nullptr;
   std::vector<Triangle> triangles;
-  std::vector<Triangle> triangles_without_leaves;
+  std::vector<worlds::SurfaceClass> class_of_triangle;
+  RTCScene scene = nullptr;
+  std::shared_future<void> built;
 
-  explicit Embree(const worlds::World& world) {
+  Embree(const worlds::World& world, Build build) {
     // One instruction set and one thread: the same tree, hence the same ties, on every host.
     device = rtcNewDevice("isa=avx2,threads=1,set_affinity=0");
     if (device == nullptr) fail_loudly(nullptr, rtcGetDeviceError(nullptr), "no device");
@@ -109,48 +113,49 @@ struct Scene::Embree {
     std::copy(source.begin(), source.end(), copied);
     vertices = copied;
     triangles = world.mesh.triangles;
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      if (world.class_of_triangle(i) != worlds::SurfaceClass::kLeaf) {
-        triangles_without_leaves.push_back(triangles[i]);
-      }
-    }
-    all = build(triangles, source.size(), RTC_BUILD_QUALITY_HIGH);
-    without_leaves = build(triangles_without_leaves, source.size(), RTC_BUILD_QUALITY_MEDIUM);
     make_facets(world);
+    attach(source.size());
+    const bool beside = build == Build::kBeside;
+    built = std::async(beside ? std::launch::async : std::launch::deferred,
+                       [this] { rtcCommitScene(scene); });
+    if (!beside) built.get();
   }
   ~Embree() {
-    rtcReleaseScene(all);
-    rtcReleaseScene(without_leaves);
+    built.wait();
+    rtcReleaseScene(scene);
     rtcReleaseBuffer(vertex_buffer);
     rtcReleaseDevice(device);
   }
   Embree(const Embree&) = delete;
   Embree& operator=(const Embree&) = delete;
 
-  [[nodiscard]] RTCScene build(const std::vector<Triangle>& indices, std::size_t vertex_count,
-                               RTCBuildQuality quality) const {
-    const RTCScene scene = rtcNewScene(device);
+  /// The scene, its tree built.
+  [[nodiscard]] RTCScene tree() const {
+    built.get();
+    return scene;
+  }
+
+  void attach(std::size_t vertex_count) {
+    scene = rtcNewScene(device);
     // Not robust: a ray may slip through a seam between triangles (never seen in 1e7), casts are 40
     // % faster, and only without it does the high-quality build split triangles.
-    rtcSetSceneBuildQuality(scene, quality);
-    if (!indices.empty()) {
-      const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-      rtcSetGeometryBuildQuality(geometry, quality);
-      rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertex_buffer, 0,
-                           sizeof(Vec3f), vertex_count);
-      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                 indices.data(), 0, sizeof(Triangle), indices.size());
-      rtcSetGeometryPointQueryFunction(geometry, visit_triangle);
-      rtcCommitGeometry(geometry);
-      rtcAttachGeometry(scene, geometry);
-      rtcReleaseGeometry(geometry);
-    }
-    rtcCommitScene(scene);
-    return scene;
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    if (triangles.empty()) return;
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertex_buffer, 0,
+                         sizeof(Vec3f), vertex_count);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                               triangles.data(), 0, sizeof(Triangle), triangles.size());
+    rtcSetGeometryPointQueryFunction(geometry, visit_triangle);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
   }
 
   void make_facets(const worlds::World& world) {
     facets.resize(triangles.size());
+    class_of_triangle.resize(triangles.size());
     for (std::size_t i = 0; i < triangles.size(); ++i) {
       const Triangle& t = triangles[i];
       const Vec3 a = vertices[t[0]].cast<double>();
@@ -160,11 +165,12 @@ struct Scene::Embree {
       facet.corner_W = vertices[t[0]];
       facet.normal_W = (b - a).cross(c - a).normalized().cast<float>();
       facet.object = world.mesh.object_of_triangle[i];
+      class_of_triangle[i] = world.class_of_triangle(i);
       facet.reflectivity = world.objects[facet.object].reflectivity;
     }
   }
 
-  void cast_packet(std::span<const Ray> rays, std::span<RayHit> hits) const {
+  void cast_packet(RTCScene tree, std::span<const Ray> rays, std::span<RayHit> hits) const {
     alignas(32) std::array<int, kPacket> active{};
     RTCRayHit8 packet;
     for (std::size_t i = 0; i < kPacket; ++i) {
@@ -186,7 +192,7 @@ struct Scene::Embree {
     }
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    rtcIntersect8(active.data(), all, &context, &packet);
+    rtcIntersect8(active.data(), tree, &context, &packet);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       // A miss leaves geometry and primitive invalid alike.
       const bool missed = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID;
@@ -208,7 +214,8 @@ struct Scene::Embree {
   }
 };
 
-Scene::Scene(const worlds::World& world) : embree_(std::make_unique<Embree>(world)) {}
+Scene::Scene(const worlds::World& world, Build build)
+    : embree_(std::make_unique<Embree>(world, build)) {}
 Scene::~Scene() = default;
 
 Hit Scene::cast(const Vec3& origin_W, const Vec3& direction_W, double max_distance_m) const {
@@ -224,7 +231,7 @@ Hit Scene::cast(const Vec3& origin_W, const Vec3& direction_W, double max_distan
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(embree_->all, &context, &query);
+  rtcIntersect1(embree_->tree(), &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   const Facet& facet = embree_->facets[query.hit.primID];
   Hit hit;
@@ -238,18 +245,23 @@ Hit Scene::cast(const Vec3& origin_W, const Vec3& direction_W, double max_distan
 }
 
 void Scene::cast(std::span<const Ray> rays, std::span<RayHit> hits) const {
+  const RTCScene tree = embree_->tree();
   for (std::size_t i = 0; i < rays.size(); i += kPacket) {
     const std::size_t count = std::min(kPacket, rays.size() - i);
-    embree_->cast_packet(rays.subspan(i, count), hits.subspan(i, count));
+    embree_->cast_packet(tree, rays.subspan(i, count), hits.subspan(i, count));
   }
   // In a second pass, when the facets have arrived in the cache.
   for (std::size_t i = 0; i < rays.size(); ++i) embree_->finish(rays[i], hits[i]);
 }
 
-double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m, Surfaces surfaces) const {
-  const bool all = surfaces == Surfaces::kAll;
-  NearestQuery nearest{p_W, max_distance_m, embree_->vertices,
-                       (all ? embree_->triangles : embree_->triangles_without_leaves).data()};
+double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m,
+                                  worlds::ClassSet classes) const {
+  NearestQuery nearest{p_W,
+                       max_distance_m,
+                       classes,
+                       embree_->class_of_triangle.data(),
+                       embree_->vertices,
+                       embree_->triangles.data()};
   RTCPointQuery query;
   query.x = static_cast<float>(p_W.x());
   query.y = static_cast<float>(p_W.y());
@@ -259,7 +271,7 @@ double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m, Surfac
   query.radius = static_cast<float>(max_distance_m) * 1.000001F + 1e-5F;
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
-  rtcPointQuery(all ? embree_->all : embree_->without_leaves, &query, &context, nullptr, &nearest);
+  rtcPointQuery(embree_->tree(), &query, &context, nullptr, &nearest);
   return nearest.best_m;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "math/types.h"
+#include "worlds/occupancy.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
@@ -47,7 +48,10 @@ struct RayHit {
 /// own arithmetic, because Embree's reciprocals differ in the last bits between CPU vendors.
 class Scene {
  public:
-  explicit Scene(const worlds::World& world);
+  /// When the tree of the triangles is built, seconds for a large world: before the constructor
+  /// returns, or on a thread of its own, where whoever asks first waits for it.
+  enum class Build : std::uint8_t { kNow, kBeside };
+  explicit Scene(const worlds::World& world, Build build = Build::kNow);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
@@ -60,10 +64,13 @@ class Scene {
   /// span are neighbours in space. A ray whose max_distance_m is negative meets nothing.
   void cast(std::span<const Ray> rays, std::span<RayHit> hits) const;
 
-  enum class Surfaces : std::uint8_t { kAll, kWithoutLeaves };
-  /// Distance from a point to the nearest triangle, exact; `max_distance_m` where none is nearer.
+  /// Surfaces that stand in a vehicle's way.
+  static constexpr worlds::ClassSet kWithoutLeaves =
+      worlds::ClassSet::all().without(worlds::SurfaceClass::kLeaf);
+  /// Distance from a point to the nearest triangle of these classes, exact; `max_distance_m` where
+  /// none is nearer.
   [[nodiscard]] double distance_to_surface(const Vec3& p_W, double max_distance_m,
-                                           Surfaces surfaces = Surfaces::kWithoutLeaves) const;
+                                           worlds::ClassSet classes = kWithoutLeaves) const;
 
  private:
   struct Embree;

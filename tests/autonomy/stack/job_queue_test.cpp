@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <stdexcept>
 
 #include "math/random.h"
@@ -47,13 +48,39 @@ TEST(JobQueue, ALaneRunsOneJobAfterTheOther) {
   EXPECT_EQ(jobs.timings().at(0).seconds.size(), 20u);
 }
 
+TEST(JobQueue, JobsSideBySideShareTheThreadsAndDeliverInOrder) {
+  // Each job ends when all three have begun.
+  JobQueue jobs(3);
+  const auto lane = jobs.add_lane("a", JobQueue::Order::kSideBySide);
+  std::atomic<int> begun{0};
+  std::vector<int> seen;
+  std::vector<int> together(3, 0);
+  for (int i = 0; i < 3; ++i) {
+    jobs.schedule(lane, kMs, [&, i]() -> JobQueue::Delivery {
+      ++begun;
+      for (int n = 0; n < 5000 && begun < 3; ++n) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      together[static_cast<std::size_t>(i)] = begun;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20 * (2 - i)));  // the last ends first
+      return [&seen, i] { seen.push_back(i); };
+    });
+  }
+  jobs.advance(kMs);
+  EXPECT_EQ(together, (std::vector<int>{3, 3, 3}));
+  EXPECT_EQ(seen, (std::vector<int>{0, 1, 2}));
+}
+
 // The whole point: random jobs on several lanes, whose deliveries start new jobs, give one and the
 // same sequence of deliveries with 1, 2 and 4 threads.
 TEST(JobQueue, DeliveriesAreTheSameForAnyNumberOfThreads) {
   auto run = [](int threads, std::uint64_t seed) {
     JobQueue jobs(threads);
     std::vector<JobQueue::Lane> lanes;
-    for (int i = 0; i < 3; ++i) lanes.push_back(jobs.add_lane("lane"));
+    for (int i = 0; i < 3; ++i) {
+      lanes.push_back(jobs.add_lane(
+          "lane", i == 1 ? JobQueue::Order::kSideBySide : JobQueue::Order::kOneByOne));
+    }
     std::vector<std::uint64_t> log;
     RandomStream random(seed, "jobs");
     for (Stamp now = 0; now < 300 * kMs; now += kMs) {
@@ -122,6 +149,36 @@ TEST(JobQueue, TheCallerTakesOtherLanesJobsWhileItWaits) {
   });
   jobs.advance(kMs);
   EXPECT_TRUE(seen);
+}
+
+TEST(JobQueue, TheCallerLeavesLongJobsToOthersWhileItWaitsForAShortOne) {
+  JobQueue jobs(2);
+  const auto quick = jobs.add_lane("quick"), slow = jobs.add_lane("slow");
+  // What the lanes' jobs take, as the queue comes to know it: CPU time.
+  jobs.schedule(quick, kMs, [] { return JobQueue::Delivery{}; });
+  jobs.schedule(slow, kMs, []() -> JobQueue::Delivery {
+    const std::clock_t begin = std::clock();
+    while (std::clock() - begin < CLOCKS_PER_SEC / 50) {
+    }
+    return nullptr;
+  });
+  jobs.advance(kMs);
+  std::atomic<bool> begun{false}, slow_begun{false}, slow_waited{false};
+  jobs.schedule(quick, 2 * kMs, [&]() -> JobQueue::Delivery {
+    begun = true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    slow_waited = !slow_begun;
+    return nullptr;
+  });
+  while (!begun) std::this_thread::yield();  // by the other thread
+  jobs.schedule(slow, 3 * kMs, [&]() -> JobQueue::Delivery {
+    slow_begun = true;
+    return nullptr;
+  });
+  jobs.advance(2 * kMs);
+  EXPECT_TRUE(slow_waited);
+  jobs.advance(3 * kMs);
+  EXPECT_TRUE(slow_begun);
 }
 
 TEST(JobQueue, RethrowsWhatAJobThrew) {

@@ -187,7 +187,7 @@ double Flight::distance_m() const {
 }
 
 double Flight::surface_distance(const Vec3& p_W) const {
-  return simulation_->scene.distance_to_surface(p_W, 1.0, sim::Scene::Surfaces::kAll);
+  return simulation_->scene.distance_to_surface(p_W, 1.0, worlds::ClassSet::all());
 }
 
 }  // namespace arex::bench

@@ -240,7 +240,7 @@ TEST(MapScore, MeasuresNormalNoiseAndOutliersInClosedForm) {
     }
     for (int i = 0; i < 1000; ++i) add(0, 0, 2 + 0.1 * random.uniform());
     add(0, 0, 2.5);  // nearest to foliage, but not explained by it
-    const MapScore score = score_map(cloud, X_WO, world, scene);
+    const MapScore score = score_map(cloud, X_WO, scene);
     EXPECT_EQ(score.points, 21001U);
     EXPECT_EQ(score.foliage, 1000U);
     EXPECT_EQ(score.scored, 20001U);
@@ -250,7 +250,7 @@ TEST(MapScore, MeasuresNormalNoiseAndOutliersInClosedForm) {
     EXPECT_NEAR(score.p95_m, 2.046 * kSigma, 0.0022);
     MapErrorConfig sparse;
     sparse.max_points = 5000;
-    const MapScore sampled = score_map(cloud, X_WO, world, scene, sparse);
+    const MapScore sampled = score_map(cloud, X_WO, scene, sparse);
     EXPECT_EQ(sampled.scored + sampled.foliage, 5000U);
     EXPECT_NEAR(sampled.median_m, score.median_m, 0.0012);
   }

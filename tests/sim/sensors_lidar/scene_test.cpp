@@ -178,10 +178,32 @@ TEST(Scene, DistanceAgreesWithEveryTriangleTried) {
       const Vec3 p = 6 * stream.normal3();
       const double solid = brute_distance(world, p, false), all = brute_distance(world, p, true);
       ASSERT_NEAR(scene.distance_to_surface(p, 100), solid, 1e-9);
-      ASSERT_NEAR(scene.distance_to_surface(p, 100, Scene::Surfaces::kAll), all, 1e-9);
+      ASSERT_NEAR(scene.distance_to_surface(p, 100, worlds::ClassSet::all()), all, 1e-9);
       ASSERT_NEAR(scene.distance_to_surface(p, 0.5), std::min(solid, 0.5), 1e-9);
     }
   }
+}
+
+TEST(Scene, ATreeBuiltBesideAnswersTheSame) {
+  const worlds::World world = soup(7, 20'000);
+  const Scene now(world), beside(world, Scene::Build::kBeside);
+  RandomStream stream(7, "rays");
+  std::vector<Ray> rays(800);
+  for (Ray& ray : rays) {
+    ray.origin_W = (3 * stream.normal3()).cast<float>();
+    ray.direction_W = stream.normal3().normalized().cast<float>();
+    ray.max_distance_m = 50;
+  }
+  std::vector<RayHit> expected(rays.size()), hits(rays.size());
+  beside.cast(rays, hits);  // asked while it is being built
+  now.cast(rays, expected);
+  int valid = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    valid += hits[i].valid() ? 1 : 0;
+    ASSERT_EQ(hits[i].object, expected[i].object);
+    ASSERT_EQ(hits[i].distance_m, expected[i].distance_m);
+  }
+  EXPECT_GT(valid, 400);
 }
 
 TEST(Scene, EmptyWorldHoldsNothing) {

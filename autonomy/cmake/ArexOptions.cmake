@@ -30,9 +30,9 @@ add_library(arex_options INTERFACE)
 target_compile_options(arex_options INTERFACE
   -march=x86-64-v3 -ffp-contract=off -fpch-preprocess
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-  # GCC 12 sees phantom overruns and phantom uninitialised reads in vectorised assignments of Eigen's
-  # and in a char pointer plus a string.
-  -Wno-array-bounds -Wno-maybe-uninitialized -Wno-stringop-overflow
+  # GCC 12 sees phantom overruns, overlaps and uninitialised reads in Eigen's vectorised assignments
+  # and where a string is put behind a char pointer.
+  -Wno-array-bounds -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-restrict
   $<$<BOOL:${AREX_WERROR}>:-Werror>
   $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)
 target_link_options(arex_options INTERFACE $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined>)

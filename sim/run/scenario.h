@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -80,6 +81,15 @@ struct ScenarioConfig {
     f("scoring", scoring, "what the truth is compared with");
     f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
             "devices.lidar true, or odometry.source mocap");
+    // Software that takes longer than the time between two frames falls ever further behind.
+    const double scans_hz = devices.lidar ? lidar.rate_hz : 0;
+    const double frames_hz =
+        stack.mapping.local.use_depth ? std::min(depth.rate_hz, stack.mapping.depth_rate_hz) : 0;
+    f.check(stack.odometry.source == OdometryConfig::Source::kMocap ||
+                scans_hz * stack.odometry.latency_s <= 1,
+            "odometry.latency_s <= 1 / lidar.rate_hz");
+    f.check(!stack.mapping.enabled || (scans_hz + frames_hz) * stack.mapping.latency_s <= 1,
+            "mapping.latency_s <= 1 / (LiDAR and depth frames a second)");
   }
 };
 

@@ -59,6 +59,24 @@ TEST(Scenario, HasTheKeysThatOthersRelyOn) {
   }
 }
 
+TEST(Scenario, SoftwareThatCannotKeepUpIsRefused) {
+  const auto message = [](const std::vector<std::string>& settings) -> std::string {
+    try {
+      load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", settings, std::nullopt);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message({"lidar.rate_hz=20"}), "");
+  EXPECT_NE(message({"lidar.rate_hz=100"}).find("odometry.latency_s <= 1 / l"), std::string::npos);
+  EXPECT_EQ(message({"lidar.rate_hz=100", "odometry.latency_s=0.01", "mapping.latency_s=0.005"}),
+            "");
+  EXPECT_NE(message({"mapping.latency_s=0.06"}).find("mapping.latency_s <= 1 / ("),
+            std::string::npos);
+  EXPECT_NE(message({"lidar.rate_hz=7"}).find("whole number of milliseconds"), std::string::npos);
+}
+
 TEST(Scenario, ARecipeWithoutAFreeStartIsAnErrorAtItsLine) {
   const TemporaryFolder folder;
   write_text(folder / "bad.yaml",

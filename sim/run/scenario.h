@@ -83,8 +83,9 @@ struct ScenarioConfig {
             "devices.lidar true, or odometry.source mocap");
     // Software that takes longer than the time between two frames falls ever further behind.
     const double scans_hz = devices.lidar ? lidar.rate_hz : 0;
-    const double frames_hz =
-        stack.mapping.local.use_depth ? std::min(depth.rate_hz, stack.mapping.depth_rate_hz) : 0;
+    const double frames_hz = stack.mapping.local.use_depth
+                                 ? std::min<double>(depth.rate_hz, stack.mapping.depth_rate_hz)
+                                 : 0;
     f.check(stack.odometry.source == OdometryConfig::Source::kMocap ||
                 scans_hz * stack.odometry.latency_s <= 1,
             "odometry.latency_s <= 1 / lidar.rate_hz");

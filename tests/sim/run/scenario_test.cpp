@@ -62,7 +62,7 @@ TEST(Scenario, HasTheKeysThatOthersRelyOn) {
 TEST(Scenario, SoftwareThatCannotKeepUpIsRefused) {
   const auto message = [](const std::vector<std::string>& settings) -> std::string {
     try {
-      load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", settings, std::nullopt);
+      load_scenario(AREX_SOURCE_DIR "/scenarios/forest.yaml", settings, std::nullopt);
     } catch (const ConfigError& error) {
       return error.what();
     }

@@ -194,17 +194,16 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
     return;
   }
   if (current_.over(now)) {
-    if (!current_.reaches_target) {
-      enter(ReplanState::kGenNewTraj, now);
-    } else if ((current_.spline.control_points().back() - *target_).norm() <=
-               config_.goal_tolerance_m) {
+    const Vec3 end = current_.spline.control_points().back();
+    if (current_.reaches_target && (end - *target_).norm() <= config_.goal_tolerance_m) {
       target_.reset();
       report(PlannerEventKind::kTargetReached, now);
       enter(ReplanState::kWaitTarget, now);
-    } else if (is_blocked(grid, *target_)) {
+    } else if (current_.reaches_target && is_blocked(grid, *target_)) {
       give_up(StuckCause::kGoalInInflation, now);
       enter(ReplanState::kWaitTarget, now);
-    } else {  // it was blocked when this was planned: a ghost, or seen better from here
+    } else {  // further on; or it was blocked when this was planned: a ghost, or seen better from
+              // here
       enter(ReplanState::kGenNewTraj, now);
     }
     return;

@@ -120,9 +120,7 @@ void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = report(arguments); });
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int execute(int argc, char** argv) {
   CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones", "arex"};
   app.require_subcommand(1);
   int exit_code = 0;
@@ -149,14 +147,22 @@ int main(int argc, char** argv) {
   add_scenario_options(*validate_command, validate_arguments, true);
   validate_command->callback([&] { exit_code = validate(validate_arguments); });
 
+  std::vector<std::string> words(argv + 1, argv + argc);
+  sweep_arguments.sbatch_options = take_sbatch_options(words);
+  std::reverse(words.begin(), words.end());  // as CLI11 wants them
   try {
-    std::vector<std::string> words(argv + 1, argv + argc);
-    sweep_arguments.sbatch_options = take_sbatch_options(words);
-    std::reverse(words.begin(), words.end());  // as CLI11 wants them
     app.parse(words);
-    return exit_code;
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return execute(argc, argv);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "arex: %s; see arex --help\n", error.what());
     return 2;

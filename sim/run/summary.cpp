@@ -118,9 +118,8 @@ ordered_json thin_json(const std::optional<ThinBranchScore>& score) {
 void flatten_into(const ordered_json& value, const std::string& key,
                   std::vector<std::pair<std::string, std::string>>& fields) {
   if (value.is_object()) {
-    for (const auto& [name, child] : value.items()) {
-      flatten_into(child, key.empty() ? name : key + "." + name, fields);
-    }
+    const std::string prefix = key.empty() ? "" : key + ".";
+    for (const auto& [name, child] : value.items()) flatten_into(child, prefix + name, fields);
   } else if (value.is_array()) {
     fields.emplace_back(key + ".count", std::to_string(value.size()));
   } else if (value.is_null()) {

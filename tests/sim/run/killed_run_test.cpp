@@ -73,8 +73,10 @@ Remains kill_after(double seconds, From from, std::uint64_t seed) {
       {"run", AREX_SOURCE_DIR "/scenarios/waypoints.yaml", "--quiet", "--seed",
        std::to_string(seed), "--set", "depth.rate_hz=1", "--out", out.string()},
       folder.path());
-  // Events are written out last: with the first beside the header all else has begun.
-  if (from == From::kFlight) wait_for(out / "events.csv", 2);
+  if (from == From::kFlight) {
+    wait_for(out / "truth.tum", 3);   // two poses make a duration
+    wait_for(out / "events.csv", 2);  // one beside the header
+  }
   if (from == From::kFirstCloud) wait_for(out / "cloud.pcd", 1);
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   process.signal(SIGKILL);

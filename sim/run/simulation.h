@@ -24,7 +24,6 @@ enum class Outcome { kFlying, kSucceeded, kCollided, kStuck, kLost, kTimedOut, k
 inline constexpr std::array<std::string_view, 7> kOutcomeNames{
     "flying", "succeeded", "collided", "stuck", "lost", "timed_out", "interrupted"};
 
-/// What a flight amounts to; summary.json comes from it.
 /// What the explorer decided, in sum.
 struct ExplorationLog {
   int decisions = 0;
@@ -36,6 +35,7 @@ struct ExplorationLog {
   void add(const Decision& decision);
 };
 
+/// What a flight amounts to; summary.json comes from it.
 struct FlightResult {
   Outcome outcome = Outcome::kFlying;
   std::string reason;

@@ -194,16 +194,20 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
     return;
   }
   if (current_.over(now)) {
-    const Vec3 end = current_.spline.control_points().back();
-    if (current_.reaches_target && (end - *target_).norm() <= config_.goal_tolerance_m) {
+    const auto arrived = [&] {
+      const Vec3& end = current_.spline.control_points().back();
+      return (end - *target_).norm() <= config_.goal_tolerance_m;
+    };
+    if (current_.reaches_target && arrived()) {
       target_.reset();
       report(PlannerEventKind::kTargetReached, now);
       enter(ReplanState::kWaitTarget, now);
     } else if (current_.reaches_target && is_blocked(grid, *target_)) {
       give_up(StuckCause::kGoalInInflation, now);
       enter(ReplanState::kWaitTarget, now);
-    } else {  // further on; or it was blocked when this was planned: a ghost, or seen better from
-              // here
+    } else {
+      // Further on. Or the target was blocked when this was planned: a ghost, or better seen from
+      // here.
       enter(ReplanState::kGenNewTraj, now);
     }
     return;

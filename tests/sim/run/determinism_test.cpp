@@ -5,9 +5,10 @@
 namespace arex::sim {
 namespace {
 
-FlightResult fly(std::uint64_t seed, int threads, const std::string& setting = "seed=1") {
-  const Scenario scenario = load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml",
-                                          {"mission.max_time_s=8", setting}, seed);
+FlightResult fly(std::uint64_t seed, int threads, std::vector<std::string> settings = {}) {
+  settings.emplace_back("mission.max_time_s=8");
+  const Scenario scenario =
+      load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", settings, seed);
   Simulation simulation(scenario, threads);
   while (simulation.tick()) {
   }
@@ -30,9 +31,9 @@ TEST(Determinism, ARunIsTheSameForAnyNumberOfThreadsAndOtherForAnotherSeed) {
 // Of frames that are no multiple of the parts they are cast in, and of a slower device.
 TEST(Determinism, FramesOfAnyLengthArrive) {
   for (const std::string rate : {"8", "20", "40"}) {
-    const FlightResult alone = fly(1, 1, "lidar.rate_hz=" + rate);
+    const FlightResult alone = fly(1, 1, {"lidar.rate_hz=" + rate});
     EXPECT_GT(alone.flight.distance_m, 1.5) << rate;
-    EXPECT_EQ(fly(1, 2, "lidar.rate_hz=" + rate).sensor_hash, alone.sensor_hash) << rate;
+    EXPECT_EQ(fly(1, 2, {"lidar.rate_hz=" + rate}).sensor_hash, alone.sensor_hash) << rate;
   }
 }
 

@@ -195,11 +195,11 @@ std::string format_value(const T& value) {
   }
 }
 
-/// The `f` of fields() that lists every leaf with its dotted key.
+/// The `f` of fields() that lists every leaf with its dotted key, and where asked every section.
 class Lister {
  public:
-  Lister(std::string prefix, std::vector<ParameterInfo>& out)
-      : prefix_(std::move(prefix)), out_(out) {}
+  Lister(std::string prefix, std::vector<ParameterInfo>& out, bool sections)
+      : prefix_(std::move(prefix)), out_(out), sections_(sections) {}
 
   template <class T>
   void operator()(std::string_view name, T& value, std::string_view meaning) {
@@ -207,7 +207,8 @@ class Lister {
     if constexpr (kIsScalar<T> || ConfigEnum<T> || kIsEigen<T> || kIsVector<T>) {
       out_.push_back({key, format_value(value), unit_of(name), std::string(meaning)});
     } else {
-      Lister nested(key + ".", out_);
+      if (sections_) out_.push_back({key, "", "", std::string(meaning)});
+      Lister nested(key + ".", out_, sections_);
       value.fields(nested);
     }
   }
@@ -216,6 +217,7 @@ class Lister {
  private:
   std::string prefix_;
   std::vector<ParameterInfo>& out_;
+  bool sections_;
 };
 
 }  // namespace config_detail
@@ -230,7 +232,17 @@ void read_config(const ConfigNode& node, T& config) {
 template <class T>
 std::vector<ParameterInfo> list_parameters(T config) {
   std::vector<ParameterInfo> out;
-  config_detail::Lister lister("", out);
+  config_detail::Lister lister("", out, false);
+  config.fields(lister);
+  return out;
+}
+
+/// The same with an entry before the first leaf of each section, whose value is empty and whose
+/// meaning is the section's.
+template <class T>
+std::vector<ParameterInfo> describe_parameters(T config) {
+  std::vector<ParameterInfo> out;
+  config_detail::Lister lister("", out, true);
   config.fields(lister);
   return out;
 }

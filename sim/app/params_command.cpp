@@ -23,7 +23,7 @@ sim::Scenario load(const ScenarioArguments& arguments) {
 }  // namespace
 
 int params(const ScenarioArguments& arguments) {
-  const auto parameters = list_parameters(load(arguments).config);
+  const auto parameters = describe_parameters(load(arguments).config);
   std::size_t key_width = 0;
   for (const ParameterInfo& p : parameters) key_width = std::max(key_width, p.key.size());
   for (const ParameterInfo& p : parameters) {

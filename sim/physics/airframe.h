@@ -12,7 +12,7 @@ namespace arex::sim {
 
 enum class AirframePart : std::uint8_t { kBody, kArm, kRotor, kLidar, kCamera, kLeg };
 
-/// What models/arex/arex.xml says of the vehicle, in B.
+/// The true vehicle in B: models/arex/arex.xml, and what a scenario makes of it.
 struct Airframe {
   double mass_kg = 0;
   Vec3 p_BBcm = Vec3::Zero();        ///< centre of mass, m
@@ -23,7 +23,8 @@ struct Airframe {
   /// The solids. `X_WS` is the pose in B, `object` the AirframePart. The LiDAR's own housing
   /// (kLidar) is among them: whoever casts the LiDAR's rays leaves it out.
   std::vector<worlds::CollisionShape> shapes;
-  double radius_m = 0;  ///< of a sphere about B that holds all shapes
+  double radius_m = 0;           ///< of a sphere about B that holds all shapes
+  double standing_height_m = 0;  ///< of B above level ground, on its legs
 };
 
 /// Reads the model that is built into the binary.

@@ -62,6 +62,25 @@ Pose pose_of(const mjtNum* position, const mjtNum* quaternion) {
           Vec3(position[0], position[1], position[2])};
 }
 
+/// Height in B of a solid's lowest point.
+double lowest_of(const CollisionShape& shape) {
+  const Vec3 down = shape.X_WS.R.row(2).cwiseAbs().transpose();  // |z| of each of its axes
+  const Vec3& size = shape.size;
+  double reach = 0;
+  switch (shape.kind) {
+    case CollisionShape::Kind::kBox:
+      reach = down.dot(size);
+      break;
+    case CollisionShape::Kind::kCapsule:
+      reach = size.x() + size.y() * down.z();
+      break;
+    case CollisionShape::Kind::kCylinder:
+      reach = size.x() * std::hypot(down.x(), down.y()) + size.y() * down.z();
+      break;
+  }
+  return shape.X_WS.p.z() - reach;
+}
+
 int require_name(const mjModel& model, mjtObj kind, const std::string& name) {
   const int id = mj_name2id(&model, kind, name.c_str());
   if (id < 0) throw std::runtime_error("arex.xml has no " + name);
@@ -104,7 +123,16 @@ AirframePart part_of_geom(const mjModel& model, int geom) {
   throw std::runtime_error(std::string("arex.xml: unknown part ") + (name ? name : "(unnamed)"));
 }
 
-Airframe read_airframe(const mjModel& model) {
+MujocoModel with_body(MujocoModel model, const BodyConfig& body) {
+  const int id = require_name(*model, mjOBJ_BODY, "arex");
+  model->body_mass[id] = body.mass_kg;
+  for (int i = 0; i < 3; ++i) model->body_inertia[3 * id + i] *= body.inertia_scale;
+  const MujocoData data(mj_makeData(model.get()));
+  mj_setConst(model.get(), data.get());  // what the compiler derived of both
+  return model;
+}
+
+Airframe read_airframe(const mjModel& model, const BodyConfig& body_config) {
   const int body = require_name(model, mjOBJ_BODY, "arex");
   Airframe airframe;
   airframe.mass_kg = model.body_mass[body];
@@ -120,8 +148,10 @@ Airframe read_airframe(const mjModel& model) {
   }
   const int lidar = require_name(model, mjOBJ_SITE, "lidar");
   const int camera = require_name(model, mjOBJ_SITE, "camera");
-  airframe.X_BL = pose_of(model.site_pos + 3 * lidar, model.site_quat + 4 * lidar);
-  airframe.X_BC = pose_of(model.site_pos + 3 * camera, model.site_quat + 4 * camera);
+  airframe.X_BL = body_config.lidar_mount.applied_to(
+      pose_of(model.site_pos + 3 * lidar, model.site_quat + 4 * lidar));
+  airframe.X_BC = body_config.camera_mount.applied_to(
+      pose_of(model.site_pos + 3 * camera, model.site_quat + 4 * camera));
   for (int i = 0; i < model.body_geomnum[body]; ++i) {
     const int geom = model.body_geomadr[body] + i;
     CollisionShape shape;
@@ -143,8 +173,11 @@ Airframe read_airframe(const mjModel& model) {
     shape.size = {size[0], size[1], size[2]};
     shape.object = static_cast<std::uint32_t>(part_of_geom(model, geom));
     airframe.radius_m = std::max(airframe.radius_m, reach_from(shape, Vec3::Zero()));
+    airframe.standing_height_m = std::max(airframe.standing_height_m, -lowest_of(shape));
     airframe.shapes.push_back(shape);
   }
+  // The compiler's rounding is no part of the model, whose numbers have millimetres.
+  airframe.standing_height_m = std::round(1e6 * airframe.standing_height_m) / 1e6;
   return airframe;
 }
 
@@ -152,12 +185,14 @@ Airframe load_airframe() {
   return read_airframe(*compile_model("<mujoco><include file='arex.xml'/></mujoco>"));
 }
 
-ContactScene::ContactScene(const worlds::World& world, const ContactConfig& config)
+ContactScene::ContactScene(const worlds::World& world, const ContactConfig& config,
+                           const BodyConfig& body)
     : world_(world),
       config_(config),
       index_(world.collision_shapes),
-      model_(compile_model(scene_xml(world.terrain, relief(world.terrain), config.slots))),
-      airframe_(read_airframe(*model_)),
+      model_(with_body(compile_model(scene_xml(world.terrain, relief(world.terrain), config.slots)),
+                       body)),
+      airframe_(read_airframe(*model_, body)),
       shape_of_slot_(static_cast<std::size_t>(config.slots)) {
   if (config.search_radius_m <= airframe_.radius_m + kGuard_m) {
     throw std::invalid_argument("contact.search_radius_m must exceed the vehicle's radius");

@@ -25,8 +25,11 @@ using MujocoData = std::unique_ptr<mjData, MujocoDeleter>;
 /// names it `<include file="arex.xml"/>`. @throws std::runtime_error with MuJoCo's message.
 MujocoModel compile_model(const std::string& scene_xml);
 
+/// Gives the compiled model its true mass and inertia.
+[[nodiscard]] MujocoModel with_body(MujocoModel model, const BodyConfig& body);
+
 /// Reads the airframe out of a compiled model.
-Airframe read_airframe(const mjModel& model);
+Airframe read_airframe(const mjModel& model, const BodyConfig& body = {});
 
 /// The part that a geom of the vehicle belongs to.
 AirframePart part_of_geom(const mjModel& model, int geom);
@@ -41,7 +44,8 @@ AirframePart part_of_geom(const mjModel& model, int geom);
 /// all is within the vehicle's sphere, MuJoCo's collision stage is switched off.
 class ContactScene {
  public:
-  ContactScene(const worlds::World& world, const ContactConfig& config);
+  ContactScene(const worlds::World& world, const ContactConfig& config,
+               const BodyConfig& body = {});
 
   /// To be called before each step with the vehicle's position.
   void update(const Vec3& p_WB);

@@ -33,7 +33,7 @@ class Physics::Impl {
        std::uint64_t seed)
       : config_(config),
         world_(world),
-        scene_(world, config.contact),
+        scene_(world, config.contact, config.body),
         data_(mj_makeData(&scene_.model())),
         powertrain_(config.motor, config.rotor, config.battery),
         wind_(config.wind, seed) {

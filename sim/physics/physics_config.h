@@ -1,5 +1,7 @@
 #pragma once
 
+#include "math/pose.h"
+#include "math/so3.h"
 #include "math/types.h"
 
 /// Parameters of the simulated vehicle that are not geometry or mass (those stand in
@@ -151,7 +153,43 @@ struct ContactConfig {
   }
 };
 
+/// How far a sensor sits from where models/arex/arex.xml has it, and the stack's calibration too.
+struct MountErrorConfig {
+  Vec3 offset_m = Vec3::Zero();
+  Vec3 rotation_rad = Vec3::Zero();
+
+  /// The true mount, from the nominal pose in B.
+  [[nodiscard]] Pose applied_to(const Pose& X_BS) const {
+    return {so3::Exp(rotation_rad) * X_BS.R, X_BS.p + offset_m};
+  }
+
+  void fields(auto& f) {
+    f("offset_m", offset_m, "true position of the sensor minus that of the model, in B");
+    f("rotation_rad", rotation_rad, "rotation vector in B from the model's mount to the true one");
+    f.check(offset_m.cwiseAbs().maxCoeff() <= 0.2, "offset_m within 0.2 along each axis");
+    f.check(rotation_rad.cwiseAbs().maxCoeff() <= 0.5, "rotation_rad within 0.5 about each axis");
+  }
+};
+
+/// The true body. What the flight software believes of it stands in `vehicle`.
+struct BodyConfig {
+  double mass_kg = 1.9;      ///< models/arex/arex.xml [P]
+  double inertia_scale = 1;  ///< 1: models/arex/arex.xml
+  MountErrorConfig lidar_mount;
+  MountErrorConfig camera_mount;
+
+  void fields(auto& f) {
+    f("mass_kg", mass_kg, "true all-up mass; vehicle.mass_kg is what the stack believes");
+    f("inertia_scale", inertia_scale, "true inertia over that of the model, about the same centre");
+    f("lidar_mount", lidar_mount, "true mount of the LiDAR against the model's");
+    f("camera_mount", camera_mount, "true mount of the depth camera against the model's");
+    f.check(mass_kg >= 0.5 && mass_kg <= 5, "0.5 <= mass_kg <= 5");
+    f.check(inertia_scale >= 0.2 && inertia_scale <= 5, "0.2 <= inertia_scale <= 5");
+  }
+};
+
 struct PhysicsConfig {
+  BodyConfig body;  ///< its keys stand directly under `physics`
   MotorConfig motor;
   RotorConfig rotor;
   BatteryConfig battery;
@@ -160,6 +198,7 @@ struct PhysicsConfig {
   ContactConfig contact;
 
   void fields(auto& f) {
+    body.fields(f);
     f("motor", motor, "motor and speed controller");
     f("rotor", rotor, "propeller");
     f("battery", battery, "battery");

@@ -19,6 +19,7 @@ TEST(Airframe, ModelAgreesWithTheReferenceAndWithWhatTheStackBelieves) {
   const Airframe airframe = load_airframe();
   const VehicleConfig belief;
   EXPECT_NEAR(airframe.mass_kg, belief.mass_kg, 1e-12);
+  EXPECT_EQ(BodyConfig{}.mass_kg, airframe.mass_kg);  // its default is the model's
   Mat3 inertia;
   inertia << 0.0137, 0, -0.0020, 0, 0.0126, 0, -0.0020, 0, 0.0213;
   EXPECT_LT((airframe.inertia_kgm2 - inertia).norm(), 1e-9);
@@ -32,9 +33,36 @@ TEST(Airframe, ModelAgreesWithTheReferenceAndWithWhatTheStackBelieves) {
   EXPECT_LT((airframe.X_BC.R - belief.X_BC().R).norm(), 1e-9);
   EXPECT_LT((airframe.X_BC.p - belief.X_BC().p).norm(), 1e-12);
   EXPECT_LE(airframe.radius_m, belief.radius_m);
+  EXPECT_LT(belief.radius_m - airframe.radius_m, 1e-3);
+  EXPECT_EQ(airframe.standing_height_m, belief.ground_offset_m);
   const RotorConfig rotor;
   EXPECT_EQ(rotor.thrust_coefficient, belief.thrust_coefficient);
   EXPECT_EQ(rotor.torque_ratio_m, belief.torque_ratio_m);
+}
+
+TEST(Airframe, TakesTheMassInertiaAndMountsOfTheScenario) {
+  PhysicsConfig config = without_air();
+  config.body.mass_kg = 2.6;
+  config.body.inertia_scale = 1.5;
+  config.body.lidar_mount.offset_m = {0.01, -0.02, 0.03};
+  config.body.camera_mount.rotation_rad = {0, 0.1, 0};
+  const worlds::World nothing;
+  Physics heavy(config, nothing, level({0, 0, 50}), 1);
+  Physics nominal(without_air(), nothing, level({0, 0, 50}), 1);
+  const Airframe model = load_airframe();
+  EXPECT_EQ(heavy.airframe().mass_kg, 2.6);
+  EXPECT_LT((heavy.airframe().inertia_kgm2 - 1.5 * model.inertia_kgm2).norm(), 1e-9);
+  EXPECT_LT((heavy.airframe().X_BL.p - model.X_BL.p - Vec3(0.01, -0.02, 0.03)).norm(), 1e-12);
+  EXPECT_LT((heavy.airframe().X_BC.R - so3::Exp({0, 0.1, 0}) * model.X_BC.R).norm(), 1e-12);
+  // All four rotors spin alike and up together: no torque but about z, and F = m (a + g).
+  const std::array<double, 4> spinning{700, 700, 700, 700};
+  for (Physics* physics : {&heavy, &nominal}) {
+    physics->set_state(level({0, 0, 50}), Vec3::Zero(), Vec3::Zero(), spinning);
+    physics->step({});
+  }
+  const double force = 4 * RotorConfig{}.thrust_coefficient * 700 * 700;
+  EXPECT_NEAR(heavy.truth().a_WB.z() + kGravity, force / 2.6, 0.02 * force / 2.6);
+  EXPECT_NEAR(nominal.truth().a_WB.z() + kGravity, force / 1.9, 0.02 * force / 1.9);
 }
 
 TEST(Airframe, GeometryIsThatOfThePaper) {

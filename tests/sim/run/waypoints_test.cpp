@@ -44,6 +44,18 @@ TEST(Waypoints, AreFlownInTenForestsInWind) {
   }
 }
 
+// The stack believes in 1.9 kg and in the model's inertia; the observer finds the missing thrust.
+TEST(Waypoints, AreFlownByAVehicleHeavierThanItBelieves) {
+  auto overrides = kFlightOnly;
+  overrides.insert(overrides.end(), {"physics.mass_kg=2.3", "physics.inertia_scale=1.2"});
+  const FlightResult heavy = fly(overrides, 1), nominal = fly(kFlightOnly, 1);
+  EXPECT_EQ(heavy.outcome, Outcome::kSucceeded) << heavy.reason;
+  EXPECT_EQ(heavy.collisions, 0);
+  EXPECT_EQ(heavy.targets.size(), 6u);
+  // Momentum theory: hover power grows with the mass to the power of 1.5, avionics do not.
+  EXPECT_NEAR(heavy.battery.used_wh / nominal.battery.used_wh, std::pow(2.3 / 1.9, 1.5), 0.12);
+}
+
 TEST(Waypoints, AreFlownWithEverySensorRunningAndTheEnergyAddsUp) {
   const FlightResult result = fly({"odometry.source=mocap"}, 1, 2);
   expect_good_flight(result, 1);

@@ -80,10 +80,9 @@ double reachable_share(const World& world, const Bounds& region, double radius_m
 
 }  // namespace
 
-World build_world(const WorldConfig& config, std::uint64_t seed) {
+World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m) {
   World world = build_unchecked(config, seed);
-  const double share =
-      reachable_share(world, region_to_reach(config, world), config.vehicle_radius_m);
+  const double share = reachable_share(world, region_to_reach(config, world), vehicle_radius_m);
   if (share < kReachableShare) {
     const std::string name(enum_names(config.kind)[static_cast<std::size_t>(config.kind)]);
     throw ConfigError("the " + name + " recipe with seed " + std::to_string(seed) +
@@ -93,6 +92,27 @@ World build_world(const WorldConfig& config, std::uint64_t seed) {
                       std::to_string(static_cast<int>(100 * kReachableShare)) + " %");
   }
   return world;
+}
+
+Eigen::AlignedBox2d extent_of(const WorldConfig& config) {
+  const auto centred = [](const Vec2& size) {
+    return Eigen::AlignedBox2d(Vec2(-0.5 * size), Vec2(0.5 * size));
+  };
+  switch (config.kind) {
+    case WorldKind::kForest:
+      return centred(config.forest.size_m);
+    case WorldKind::kGarage:
+      return {Vec2(0, -0.5 * config.garage.width_m),
+              Vec2(config.garage.length_m, 0.5 * config.garage.width_m)};
+    case WorldKind::kGaps: {
+      const GapsRecipe& gaps = config.gaps;
+      return {Vec2(-gaps.start_radius_m, -0.5 * gaps.width_m),
+              Vec2(gaps.length_m - gaps.start_radius_m, 0.5 * gaps.width_m)};
+    }
+    case WorldKind::kEmpty:
+      return centred(config.empty.size_m);
+  }
+  throw ConfigError("unknown kind of world");
 }
 
 }  // namespace arex::worlds

@@ -19,7 +19,6 @@ constexpr std::array<std::string_view, 4> enum_names(WorldKind) {
 struct WorldConfig {
   using Kind = WorldKind;
   Kind kind = Kind::kForest;
-  double vehicle_radius_m = 0.31;
   ForestRecipe forest;
   GarageRecipe garage;
   GapsRecipe gaps;
@@ -27,20 +26,19 @@ struct WorldConfig {
 
   void fields(auto& f) {
     f("kind", kind, "forest, garage, gaps or empty");
-    f("vehicle_radius_m", vehicle_radius_m,
-      "the start must be able to leave at this radius: motor arm 0.19 m plus a 9-inch propeller's "
-      "radius");
     f("forest", forest, "recipe of kind forest");
     f("garage", garage, "recipe of kind garage");
     f("gaps", gaps, "recipe of kind gaps");
     f("empty", empty, "recipe of kind empty");
-    f.check(vehicle_radius_m > 0 && vehicle_radius_m <= 2, "0 < vehicle_radius_m <= 2");
   }
 };
 
 /// Builds the chosen world; a pure function of its arguments.
-/// @throws ConfigError (without FILE:LINE) if most of the free space cannot be reached from the
-/// start.
-World build_world(const WorldConfig& config, std::uint64_t seed);
+/// @throws ConfigError (without FILE:LINE) if a vehicle of this radius cannot reach most of the
+/// free space from the start.
+World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m);
+
+/// Where there is ground to fly over, along x and y from the start, m: known without building.
+Eigen::AlignedBox2d extent_of(const WorldConfig& config);
 
 }  // namespace arex::worlds

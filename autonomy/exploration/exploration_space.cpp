@@ -14,29 +14,7 @@ namespace {
 constexpr std::uint32_t kStraight = 70, kDiagonal = 99;
 constexpr std::int32_t kNoObstacle = std::numeric_limits<std::int32_t>::max();
 
-/// Where a horizontal line crosses the polygon, in ascending order (even-odd rule).
-std::vector<double> crossings(const std::vector<Vec2>& polygon, double y) {
-  std::vector<double> xs;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec2& a = polygon[i];
-    const Vec2& b = polygon[(i + 1) % polygon.size()];
-    if ((a.y() > y) == (b.y() > y)) continue;
-    xs.push_back(a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x()));
-  }
-  std::sort(xs.begin(), xs.end());
-  return xs;
-}
-
-bool is_between_crossings(const std::vector<double>& xs, double x) {
-  return (std::upper_bound(xs.begin(), xs.end(), x) - xs.begin()) % 2 == 1;
-}
-
 }  // namespace
-
-bool ExplorationBounds::contains(const Vec2& p) const {
-  if ((p.array() < low_m.array()).any() || (p.array() > high_m.array()).any()) return false;
-  return polygon_m.empty() || is_between_crossings(crossings(polygon_m, p.y()), p.x());
-}
 
 ExplorationSpace::ExplorationSpace(const OccupancyMap2D& map, const ExplorationBounds& bounds,
                                    const SpaceConfig& config, const Vec2& robot)
@@ -55,14 +33,12 @@ void ExplorationSpace::classify() {
   unknown_count_.assign((width + 1) * static_cast<std::size_t>(map_.height), 0);
   for (int y = 0; y < map_.height; ++y) {
     const Vec2 row = map_.centre_of({0, y});
-    const bool row_inside = row.y() >= bounds_.low_m.y() && row.y() <= bounds_.high_m.y();
-    const std::vector<double> xs = crossings(bounds_.polygon_m, row.y());
+    const ExplorationBounds::Row inside_row = bounds_.row(row.y());
     const std::size_t base = static_cast<std::size_t>(y) * width;
     std::int32_t* count = unknown_count_.data() + static_cast<std::size_t>(y) * (width + 1);
     for (std::size_t x = 0; x < width; ++x) {
       const double at = row.x() + map_.resolution * static_cast<double>(x);
-      const bool inside = row_inside && at >= bounds_.low_m.x() && at <= bounds_.high_m.x() &&
-                          (bounds_.polygon_m.empty() || is_between_crossings(xs, at));
+      const bool inside = inside_row.contains(at);
       const std::int8_t state = map_.cells[base + x];
       std::uint8_t flags = inside ? kInside : std::uint8_t{0};
       if (state == OccupancyMap2D::kFree) flags |= kFree;

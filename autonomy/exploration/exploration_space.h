@@ -5,40 +5,23 @@
 #include <optional>
 #include <vector>
 
+#include "exploration/exploration_bounds.h"
 #include "mapping/occupancy_map_2d.h"
 
 namespace arex {
 
-/// The area to explore, in O: a box, and inside it a polygon where one is given.
-struct ExplorationBounds {
-  Vec2 low_m{-25, -20};  ///< paper, Scene 1: 25 m ahead and behind, 20 m to either side
-  Vec2 high_m{25, 20};
-  std::vector<Vec2> polygon_m;  ///< corners in order; empty: the whole box
-
-  [[nodiscard]] bool contains(const Vec2& p) const;
-
-  void fields(auto& f) {
-    f("low_m", low_m, "lower corner of the exploration bounds in O (paper, Scene 1)");
-    f("high_m", high_m, "upper corner of the exploration bounds in O (paper, Scene 1)");
-    f("polygon_m", polygon_m, "corners of a polygon that narrows the box; empty: the whole box");
-    f.check((low_m.array() < high_m.array()).all(), "low_m < high_m");
-    f.check(polygon_m.empty() || polygon_m.size() >= 3, "polygon_m has 3 corners or more");
-  }
-};
-
 struct SpaceConfig {
-  double travel_radius_m = 0.5;  ///< what the planner keeps (paper, IV-A: inflation)
+  /// Distance from obstacles at which the vehicle's centre may pass; handed down from
+  /// planning.inflation_m.
+  double travel_radius_m = 0.5;
   double start_reach_m = 1.5;
   double information_radius_m = 1.0;
 
   void fields(auto& f) {
-    f("travel_radius_m", travel_radius_m,
-      "distance from obstacles at which the vehicle's centre may pass: the planner's inflation");
     f("start_reach_m", start_reach_m,
       "how far from the vehicle the known-free space may begin: cells below it may be unseen");
     f("information_radius_m", information_radius_m,
       "radius of the disc whose unknown area is f_I (rrt_exploration)");
-    f.check(travel_radius_m >= 0, "travel_radius_m >= 0");
     f.check(start_reach_m >= 0, "start_reach_m >= 0");
     f.check(information_radius_m > 0, "information_radius_m > 0");
   }

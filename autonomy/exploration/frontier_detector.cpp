@@ -94,6 +94,7 @@ FrontierDetector::FrontierDetector(const FrontierDetectorConfig& config, std::ui
 const std::vector<FrontierPoint>& FrontierDetector::update(const ExplorationSpace& space) {
   drop_known(space);
   if (!space.has_start()) return points_;
+  area_ = space.bounds().extent();
   grow_local(space);
   grow_global(space);
   cluster(space);
@@ -102,9 +103,8 @@ const std::vector<FrontierPoint>& FrontierDetector::update(const ExplorationSpac
 
 bool FrontierDetector::grow_once(const ExplorationSpace& space, double step_m, RandomStream& random,
                                  VertexSet& tree) {
-  const ExplorationBounds& bounds = space.bounds();
-  const double x = random.uniform(bounds.low_m.x(), bounds.high_m.x());
-  const double y = random.uniform(bounds.low_m.y(), bounds.high_m.y());
+  const double x = random.uniform(area_.min().x(), area_.max().x());
+  const double y = random.uniform(area_.min().y(), area_.max().y());
   const Vec2 sample(x, y);
   const Vec2 from = tree.nearest(sample);
   const double distance = (sample - from).norm();
@@ -125,7 +125,7 @@ bool FrontierDetector::grow_once(const ExplorationSpace& space, double step_m, R
 
 void FrontierDetector::grow_local(const ExplorationSpace& space) {
   const auto restart = [&] {
-    local_.reset(space.bounds().low_m, space.bounds().high_m);
+    local_.reset(area_.min(), area_.max());
     local_.add(space.start());
   };
   restart();
@@ -138,7 +138,7 @@ void FrontierDetector::grow_global(const ExplorationSpace& space) {
   // The map may have changed its mind about a vertex: only those that can be reached stay. The
   // vehicle's own place joins them, so that the tree can always grow.
   const std::vector<Vec2> before = global_.points();
-  global_.reset(space.bounds().low_m, space.bounds().high_m);
+  global_.reset(area_.min(), area_.max());
   for (const Vec2& p : before) {
     if (space.is_reachable(space.map().cell_of(p))) global_.add(p);
   }

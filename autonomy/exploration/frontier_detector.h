@@ -99,6 +99,7 @@ class FrontierDetector {
   FrontierDetectorConfig config_;
   RandomStream local_random_, global_random_;
   VertexSet local_, global_;
+  Eigen::AlignedBox2d area_;  ///< that samples are drawn from
   std::vector<FrontierPoint> points_;
 };
 

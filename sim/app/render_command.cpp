@@ -87,7 +87,7 @@ int render(const RenderArguments& arguments) {
   }
   const sim::Scenario scenario = sim::load_scenario(folder / "resolved.yaml", {}, {});
   const worlds::World world = scenario.build_world();
-  const Pose X_WO = sim::start_pose(world, scenario.config.stack.vehicle);
+  const Pose X_WO = sim::start_pose(world);
   if (ending == ".png") {
     draw_still(arguments, world, X_WO, truth);
   } else {

@@ -23,7 +23,7 @@ struct RecipeConfig {
 
 worlds::World build(const ConfigNode& root, const RecipeConfig& recipe) {
   try {
-    return worlds::build_world(recipe.world, recipe.seed);
+    return worlds::build_world(recipe.world, recipe.seed, sim::load_airframe().radius_m);
   } catch (const ConfigError& error) {
     throw ConfigError(root.where + ": " + error.what());
   }

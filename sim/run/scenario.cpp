@@ -1,20 +1,63 @@
 #include "run/scenario.h"
 
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "run/moved_keys.h"
+
 namespace arex::sim {
 
 std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
 
-worlds::World Scenario::build_world() const {
+namespace {
+
+/// Whether the vehicle has room where it begins to explore; the score's flood starts there.
+bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& region,
+                              const ReachableSpaceConfig& config) {
+  const Vec2 p = region.start_O.head<2>(), around(1, 1);
+  ScoredRegion nearby = region;
+  nearby.bounds = {p - around, p + around, {}};
   try {
-    return worlds::build_world(config.world, config.seed);
-  } catch (const ConfigError& error) {
-    const ConfigNode* world = source.find("world");
-    throw ConfigError((world ? world->where : source.where) + ": " + error.what());
+    static_cast<void>(
+        find_reachable_space(world, start_pose(world), nearby, load_airframe().radius_m, config));
+  } catch (const std::invalid_argument&) {
+    return false;
   }
+  return true;
 }
 
-Pose start_pose(const worlds::World& world, const VehicleConfig& vehicle) {
-  return world.X_WS * Pose{Mat3::Identity(), {0, 0, vehicle.ground_offset_m}};
+}  // namespace
+
+worlds::World Scenario::build_world() const {
+  worlds::World world;
+  try {
+    world = worlds::build_world(config.world, config.seed, load_airframe().radius_m);
+  } catch (const ConfigError& error) {
+    const ConfigNode* node = source.find("world");
+    throw ConfigError((node ? node->where : source.where) + ": " + error.what());
+  }
+  const bool explores = config.stack.mission.kind == MissionConfig::Kind::kExplore;
+  if (explores &&
+      !has_room_to_explore_from(world, scored_region(), config.scoring.coverage.space)) {
+    const std::string rule =
+        "mission.entry_m to end, or without it the start to stand, where the vehicle has room "
+        "between scoring.low_m and scoring.high_m";
+    config_detail::fail(config_detail::locate_rule(source, rule), "expected " + rule);
+  }
+  return world;
+}
+
+ScoredRegion Scenario::scored_region() const {
+  return {config.stack.exploration.explorer.bounds, config.scoring.low_m, config.scoring.high_m,
+          config.stack.explored_from()};
+}
+
+Pose start_pose(const worlds::World& world) {
+  static const double standing_m = load_airframe().standing_height_m;
+  return world.X_WS * Pose{Mat3::Identity(), {0, 0, standing_m}};
 }
 
 namespace {
@@ -31,6 +74,49 @@ void tell_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
                           (believed.middle_v + believed.full_v) * (1 - believed.middle_charge));
 }
 
+/// Fills in, before the scenario's own words are read again over it, what follows from them where
+/// they say nothing: exploration bounds that end where the world does, the mapped box around them,
+/// the scores of that region as the map sees it, and what the stack knows of its battery.
+void derive(ScenarioConfig asked, ScenarioConfig& config) {
+  if (asked.stack.mission.kind == MissionConfig::Kind::kExplore) {
+    ExplorationBounds& bounds = asked.stack.exploration.explorer.bounds;
+    const Eigen::AlignedBox2d world = worlds::extent_of(asked.world);
+    bounds.low_m = bounds.low_m.cwiseMax(world.min());
+    bounds.high_m = bounds.high_m.cwiseMin(world.max());
+    config.stack.exploration.explorer.bounds = bounds;
+  }
+  tell_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
+  set_mapped_box(asked.stack, config.stack.mapping.global);
+  const GlobalMapConfig& map = asked.stack.mapping.global;
+  config.scoring.low_m = std::max(config.scoring.low_m, map.low_m.z());
+  config.scoring.high_m = std::min(config.scoring.high_m, map.high_m.z());
+  CoverageConfig& coverage = config.scoring.coverage;
+  coverage.band_above_terrain = map.band == BandReference::kGround;
+  coverage.band_low_m = map.band_low_m;
+  coverage.band_high_m = map.band_high_m;
+  coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;
+}
+
+/// The rule that the world, the explored region and the scores break together; empty: none.
+std::string broken_region_rule(const ScenarioConfig& config) {
+  if (std::string rule = config.stack.broken_region_rule(); !rule.empty()) return rule;
+  if (config.stack.mission.kind != MissionConfig::Kind::kExplore) return "";
+  const GlobalMapConfig& map = config.stack.mapping.global;
+  if (config.scoring.low_m < map.low_m.z() || config.scoring.high_m > map.high_m.z()) {
+    return "scoring.low_m, scoring.high_m within the heights of mapping.global";
+  }
+  // Beyond the world's edge nothing can become known.
+  const Vec2 rounding = Vec2::Constant(1e-6);
+  const Eigen::AlignedBox2d world = worlds::extent_of(config.world);
+  const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
+  if (about.contains(config.stack.exploration.explorer.bounds.extent())) return "";
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "exploration.bounds within the world, which reaches from [%g, %g] to [%g, %g]",
+                world.min().x(), world.min().y(), world.max().x(), world.max().y());
+  return text.data();
+}
+
 }  // namespace
 
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
@@ -40,10 +126,15 @@ Scenario load_scenario(const std::filesystem::path& file, const std::vector<std:
   scenario.source = load_yaml(file);
   for (const std::string& assignment : overrides) apply_override(scenario.source, assignment);
   if (seed) apply_override(scenario.source, "seed=" + std::to_string(*seed));
-  ScenarioConfig flown;
-  read_config(scenario.source, flown);
-  tell_battery(flown.physics.battery, scenario.config.stack.exploration.explorer.consumption);
+  refuse_moved_keys(scenario.source);
+  ScenarioConfig asked;
+  read_config(scenario.source, asked);
+  derive(std::move(asked), scenario.config);
   read_config(scenario.source, scenario.config);
+  if (const std::string rule = broken_region_rule(scenario.config); !rule.empty()) {
+    config_detail::fail(config_detail::locate_rule(scenario.source, rule),
+                        "out of range: expected " + rule);
+  }
   return scenario;
 }
 

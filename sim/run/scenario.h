@@ -8,6 +8,7 @@
 
 #include "autopilot/autopilot_config.h"
 #include "config/config.h"
+#include "physics/airframe.h"
 #include "physics/physics_config.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
@@ -71,7 +72,7 @@ struct ScenarioConfig {
   void fields(auto& f) {
     f("seed", seed, "of everything random");
     f("world", world, "where to fly");
-    f("physics", physics, "motors, rotors, battery, drag, wind");
+    f("physics", physics, "the true vehicle: body, motors, rotors, battery, drag, wind");
     f("imu", imu, "the autopilot's sensors");
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
@@ -102,12 +103,15 @@ struct Scenario {
 
   /// Every value; running it again gives the same trajectory hash.
   [[nodiscard]] std::string resolved_yaml() const;
-  /// Builds the world. @throws ConfigError at the line of `world` if the recipe gives none.
+  /// Builds the world. @throws ConfigError at the line of `world` if the recipe gives none, at that
+  /// of `mission` if the vehicle has no room where it is to explore from.
   [[nodiscard]] worlds::World build_world() const;
+  /// What an exploration is scored over: what it is told to explore.
+  [[nodiscard]] ScoredRegion scored_region() const;
 };
 
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
-Pose start_pose(const worlds::World& world, const VehicleConfig& vehicle);
+Pose start_pose(const worlds::World& world);
 
 /// Reads a scenario, applies `--set` and `--seed`, checks everything. @throws ConfigError.
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,

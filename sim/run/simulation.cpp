@@ -98,7 +98,7 @@ Simulation::Simulation(const Scenario& scenario, int threads)
     : config_(scenario.config),
       world_(scenario.build_world()),
       scene_(world_, threads > 1 ? Scene::Build::kBeside : Scene::Build::kNow),
-      physics_(config_.physics, world_, start_pose(world_, config_.stack.vehicle), config_.seed),
+      physics_(config_.physics, world_, start_pose(world_), config_.seed),
       imu_(config_.imu, config_.seed),
       lidar_(config_.lidar, scene_, physics_.airframe().X_BL,
              airframe_without_lidar(physics_.airframe()), config_.seed),
@@ -111,11 +111,9 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       depth_lane_(jobs_.add_lane("depth")),
       stack_(config_.stack, jobs_, config_.seed) {
   if (config_.stack.mission.kind != MissionConfig::Kind::kExplore) return;
-  const ExplorationBounds& bounds = config_.stack.exploration.explorer.bounds;
-  const worlds::Bounds box{{bounds.low_m.x(), bounds.low_m.y(), config_.scoring.low_m},
-                           {bounds.high_m.x(), bounds.high_m.y(), config_.scoring.high_m}};
-  coverage_ = std::make_unique<CoverageScorer>(config_.scoring.coverage, world_, scene_,
-                                               scorer_.X_WO(), box, config_.stack.vehicle.radius_m);
+  coverage_ =
+      std::make_unique<CoverageScorer>(config_.scoring.coverage, world_, scene_, scorer_.X_WO(),
+                                       scenario.scored_region(), physics_.airframe().radius_m);
 }
 
 Simulation::~Simulation() { jobs_.stop(); }

@@ -10,13 +10,14 @@ using worlds::Bounds;
 using worlds::World;
 
 CoverageScorer::CoverageScorer(const CoverageConfig& config, const World& world, const Scene& scene,
-                               const Pose& X_WO, const Bounds& bounds_O, double vehicle_radius_m)
+                               const Pose& X_WO, const ScoredRegion& region,
+                               double vehicle_radius_m)
     : config_(config), path_(config.path) {
   const ReachableSpace space =
-      find_reachable_space(world, X_WO, bounds_O, vehicle_radius_m, config.space);
+      find_reachable_space(world, X_WO, region, vehicle_radius_m, config.space);
   reachable_volume_m3_ = space.volume_m3();
   collect_area(world, space, X_WO);
-  collect_surface(world, scene, space, X_WO, bounds_O);
+  collect_surface(world, scene, space, X_WO, region);
   index_samples();
 }
 
@@ -56,18 +57,17 @@ void CoverageScorer::collect_area(const World& world, const ReachableSpace& spac
 
 void CoverageScorer::collect_surface(const World& world, const Scene& scene,
                                      const ReachableSpace& space, const Pose& X_WO,
-                                     const Bounds& bounds_O) {
-  const Vec3 margin = Vec3::Constant(config_.space.margin_m);
-  // What is above the bounds may be seen from within and counts up to its own limit.
-  Bounds inside_O{bounds_O.low - margin, bounds_O.high + margin};
-  inside_O.high.z() = std::numeric_limits<double>::infinity();
+                                     const ScoredRegion& region) {
   const Vec3 end = space.grid.origin + space.grid.resolution_m * space.grid.size.cast<double>();
   const Bounds box{space.grid.origin,
                    {end.x(), end.y(), end.z() + config_.surface.sample_height_m}};
   std::vector<SurfaceSample> all = sample_surfaces(world, box, config_.surface);
   const Pose X_OW = X_WO.inverse();
   std::erase_if(all, [&](const SurfaceSample& sample) {
-    return !inside_O.contains(X_OW * sample.p_W.cast<double>());
+    // What is above the region may be seen from within and counts up to its own limit.
+    const Vec3 p_O = X_OW * sample.p_W.cast<double>();
+    return p_O.z() < region.low_m - config_.space.margin_m ||
+           !region.bounds.is_near(p_O.head<2>(), config_.space.margin_m);
   });
   const Viewpoints viewpoints(space, config_.visibility.viewpoint_spacing_m);
   const std::vector<std::uint8_t> visible =

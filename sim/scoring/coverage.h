@@ -82,10 +82,10 @@ class CoverageScorer {
  public:
   /// @param scene of `world`; neither is read after construction
   /// @param X_WO O in W at the start, where the vehicle stands; level
-  /// @param bounds_O where it may explore, in O
+  /// @param region what it is told to explore
   /// @throws std::invalid_argument if the vehicle does not fit at its start
   CoverageScorer(const CoverageConfig& config, const worlds::World& world, const Scene& scene,
-                 const Pose& X_WO, const worlds::Bounds& bounds_O, double vehicle_radius_m);
+                 const Pose& X_WO, const ScoredRegion& region, double vehicle_radius_m);
 
   /// The vehicle's true position, as often as its path bends (10 Hz will do).
   void add_position(const Vec3& p_WB);
@@ -107,7 +107,7 @@ class CoverageScorer {
  private:
   void collect_area(const worlds::World& world, const ReachableSpace& space, const Pose& X_WO);
   void collect_surface(const worlds::World& world, const Scene& scene, const ReachableSpace& space,
-                       const Pose& X_WO, const worlds::Bounds& bounds_O);
+                       const Pose& X_WO, const ScoredRegion& region);
   void index_samples();
   void count_area(const OccupancyMap2D& map, const Pose& X_WO);
   void place_area(const OccupancyMap2D& map, const Pose& X_WO);

@@ -16,7 +16,7 @@ constexpr std::uint8_t kPassable = 1;
 constexpr std::uint8_t kReachable = 2;
 
 // The box in W around the bounds, cut to the world.
-Bounds region_in_W(const World& world, const Pose& X_WO, const Bounds& bounds_O) {
+Bounds box_in_W(const World& world, const Pose& X_WO, const Bounds& bounds_O) {
   Eigen::AlignedBox3d box;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 p_O(corner & 1 ? bounds_O.high.x() : bounds_O.low.x(),
@@ -27,11 +27,11 @@ Bounds region_in_W(const World& world, const Pose& X_WO, const Bounds& bounds_O)
   return {box.min().cwiseMax(world.bounds.low), box.max().cwiseMin(world.bounds.high)};
 }
 
-// Marks the cells where the sphere fits and that lie inside the bounds. Far from the region's rim
+// Marks the cells where the sphere fits and that lie inside the bounds. Far from the box's rim
 // the answer is that of the distance field; the padding makes it so at the rim as well.
 std::vector<std::uint8_t> passable_cells(const World& world, const GridGeometry& grid,
-                                         const Bounds& region, const Pose& X_WO,
-                                         const Bounds& bounds_O, double radius_m) {
+                                         const Bounds& box, const Pose& X_WO,
+                                         const ExplorationBounds& bounds, double radius_m) {
   std::vector<float> distance;
   {
     const auto occupancy =
@@ -45,11 +45,9 @@ std::vector<std::uint8_t> passable_cells(const World& world, const GridGeometry&
     for (int i = 0; i < grid.size.x(); ++i) {
       // O is level: whether a column lies inside the bounds does not depend on the height.
       const Vec3 c = grid.centre({i, j, 0});
-      const Vec3 c_O = X_OW * c;
-      if ((c_O.head<2>().array() < bounds_O.low.head<2>().array()).any() ||
-          (c_O.head<2>().array() > bounds_O.high.head<2>().array()).any() ||
-          (c.head<2>().array() < region.low.head<2>().array()).any() ||
-          (c.head<2>().array() > region.high.head<2>().array()).any()) {
+      if (!bounds.contains((X_OW * c).head<2>()) ||
+          (c.head<2>().array() < box.low.head<2>().array()).any() ||
+          (c.head<2>().array() > box.high.head<2>().array()).any()) {
         continue;
       }
       cells[grid.index({i, j, 0})] = 1;
@@ -60,7 +58,7 @@ std::vector<std::uint8_t> passable_cells(const World& world, const GridGeometry&
                                          cells.begin() + static_cast<std::ptrdiff_t>(layer));
   for (int k = 0; k < grid.size.z(); ++k) {
     const double z = grid.centre({0, 0, k}).z();
-    const bool inside = z >= region.low.z() && z <= region.high.z();
+    const bool inside = z >= box.low.z() && z <= box.high.z();
     const std::size_t first = static_cast<std::size_t>(k) * layer;
     for (std::size_t c = 0; c < layer; ++c) {
       cells[first + c] = inside && column[c] && distance[first + c] > limit ? kPassable : 0;
@@ -93,19 +91,20 @@ std::size_t flood(std::vector<std::uint8_t>& cells, const GridGeometry& grid, st
 
 }  // namespace
 
-ReachableSpace find_reachable_space(const World& world, const Pose& X_WO, const Bounds& bounds_O,
-                                    double vehicle_radius_m, const ReachableSpaceConfig& config) {
-  const Bounds region = region_in_W(world, X_WO, bounds_O);
+ReachableSpace find_reachable_space(const World& world, const Pose& X_WO,
+                                    const ScoredRegion& region, double vehicle_radius_m,
+                                    const ReachableSpaceConfig& config) {
+  const Bounds box = box_in_W(world, X_WO, region.extent());
   const Vec3 pad =
       Vec3::Constant(std::max(vehicle_radius_m, config.margin_m) + 2 * config.resolution_m);
   ReachableSpace space;
-  space.grid = worlds::make_grid({region.low - pad, region.high + pad}, config.resolution_m);
+  space.grid = worlds::make_grid({box.low - pad, box.high + pad}, config.resolution_m);
   if (space.grid.cells() > UINT32_MAX) {
     throw std::invalid_argument("coverage: the exploration bounds hold too many cells");
   }
-  space.reachable = passable_cells(world, space.grid, region, X_WO, bounds_O, vehicle_radius_m);
+  space.reachable = passable_cells(world, space.grid, box, X_WO, region.bounds, vehicle_radius_m);
   for (double rise = 0; rise <= config.start_search_m; rise += config.resolution_m) {
-    const Eigen::Vector3i cell = space.grid.cell_of(X_WO.p + rise * Vec3::UnitZ());
+    const Eigen::Vector3i cell = space.grid.cell_of(X_WO * region.start_O + rise * Vec3::UnitZ());
     if (!space.grid.contains(cell) || space.reachable[space.grid.index(cell)] != kPassable)
       continue;
     space.count = flood(space.reachable, space.grid, space.grid.index(cell));

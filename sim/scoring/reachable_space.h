@@ -3,10 +3,26 @@
 #include <cstdint>
 #include <vector>
 
+#include "exploration/exploration_bounds.h"
 #include "math/pose.h"
 #include "worlds/occupancy.h"
 
 namespace arex::sim {
+
+/// What an exploration is scored over, in O: the region that the explorer is told to explore,
+/// between two heights, as far as it can be reached from where exploring begins.
+struct ScoredRegion {
+  ExplorationBounds bounds;
+  double low_m = 0;
+  double high_m = 0;
+  Vec3 start_O = Vec3::Zero();
+
+  /// The box in O that holds it.
+  [[nodiscard]] worlds::Bounds extent() const {
+    const Eigen::AlignedBox2d area = bounds.extent();
+    return {{area.min().x(), area.min().y(), low_m}, {area.max().x(), area.max().y(), high_m}};
+  }
+};
 
 /// Where the vehicle's centre can get to from its start without leaving the exploration bounds.
 struct ReachableSpace {
@@ -38,12 +54,12 @@ struct ReachableSpaceConfig {
 };
 
 /// Flood fill over face neighbours, leaves left out (they give way), from the first cell at or
-/// above O's origin where a sphere of the vehicle's radius fits. It neither passes nor ends outside
-/// the bounds, nor outside the world.
-/// @param X_WO O in W; level, as O is gravity-aligned. @param bounds_O in O, m
+/// above the region's start where a sphere of the vehicle's radius fits. It neither passes nor ends
+/// outside the region, nor outside the world.
+/// @param X_WO O in W; level, as O is gravity-aligned
 /// @throws std::invalid_argument if the vehicle does not fit at its start
 ReachableSpace find_reachable_space(const worlds::World& world, const Pose& X_WO,
-                                    const worlds::Bounds& bounds_O, double vehicle_radius_m,
+                                    const ScoredRegion& region, double vehicle_radius_m,
                                     const ReachableSpaceConfig& config = {});
 
 }  // namespace arex::sim

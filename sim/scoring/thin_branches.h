@@ -32,9 +32,9 @@ struct ThinBranchConfig {
 /// How the vehicle stops: the distance between its centre and a surface that it can still avoid is
 /// radius + speed * reaction + speed^2 / (2 braking).
 struct StoppingModel {
-  double radius_m = 0.3;
-  double braking_mps2 = 3.0;
-  double reaction_s = 0.12;
+  double radius_m = 0;
+  double braking_mps2 = 1;
+  double reaction_s = 0;
 };
 
 struct ThinBranchScore {

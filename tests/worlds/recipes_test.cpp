@@ -9,6 +9,8 @@
 namespace arex::worlds {
 namespace {
 
+constexpr double kRadius = 0.305;  // m
+
 WorldConfig config_of(WorldKind kind) {
   WorldConfig config;
   config.kind = kind;
@@ -17,13 +19,13 @@ WorldConfig config_of(WorldKind kind) {
 
 TEST(BuildWorld, GivesASolvableForestForEverySeed) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    EXPECT_NO_THROW(build_world(config_of(WorldKind::kForest), seed)) << seed;
+    EXPECT_NO_THROW(build_world(config_of(WorldKind::kForest), seed, kRadius)) << seed;
   }
 }
 
 TEST(BuildWorld, GivesASolvableGarageForEverySeed) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    EXPECT_NO_THROW(build_world(config_of(WorldKind::kGarage), seed)) << seed;
+    EXPECT_NO_THROW(build_world(config_of(WorldKind::kGarage), seed, kRadius)) << seed;
   }
 }
 
@@ -31,9 +33,30 @@ TEST(BuildWorld, IsDeterministicForEveryKind) {
   for (const WorldKind kind :
        {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps, WorldKind::kEmpty}) {
     const WorldConfig config = config_of(kind);
-    const std::uint64_t hash = world_hash(build_world(config, 3));
-    EXPECT_EQ(world_hash(build_world(config, 3)), hash);
-    EXPECT_NE(world_hash(build_world(config, 4)), hash);
+    const std::uint64_t hash = world_hash(build_world(config, 3, kRadius));
+    EXPECT_EQ(world_hash(build_world(config, 3, kRadius)), hash);
+    EXPECT_NE(world_hash(build_world(config, 4, kRadius)), hash);
+  }
+}
+
+TEST(BuildWorld, LiesWithinTheExtentThatIsKnownBefore) {
+  for (const WorldKind kind :
+       {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps, WorldKind::kEmpty}) {
+    WorldConfig config = config_of(kind);
+    config.forest.size_m = {40, 30};
+    config.gaps.width_m = 12;
+    config.empty.size_m = {20, 24};
+    config.garage.length_m = 80;
+    const Eigen::AlignedBox2d extent = extent_of(config);
+    const World world = build_world(config, 2, kRadius);
+    EXPECT_TRUE(world.X_WS.p.head<2>().isZero()) << static_cast<int>(kind);
+    // Walls and the ground's last cell stand just outside; the garage's entrance before x = 0.
+    const double outside = kind == WorldKind::kGarage ? 20 : 0.5;
+    EXPECT_LE(world.bounds.low.x(), extent.min().x() + 1e-9);
+    EXPECT_GE(world.bounds.low.x(), extent.min().x() - outside);
+    EXPECT_NEAR(world.bounds.low.y(), extent.min().y(), 0.5);
+    EXPECT_NEAR(world.bounds.high.x(), extent.max().x(), 0.5);
+    EXPECT_NEAR(world.bounds.high.y(), extent.max().y(), 0.5);
   }
 }
 
@@ -41,9 +64,8 @@ TEST(BuildWorld, RejectsARecipeThatLeavesNoFreeStart) {
   WorldConfig config = config_of(WorldKind::kForest);
   config.forest.tree_density_per_m2 = 0.55;
   config.forest.min_spacing_m = 1.0;
-  config.vehicle_radius_m = 0.8;
   try {
-    build_world(config, 1);
+    build_world(config, 1, 0.8);
     FAIL() << "accepted";
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("leaves no free start"), std::string::npos);

@@ -72,7 +72,7 @@ worlds::World make_world(const FlightOptions& options, const test::AnalyticMotio
     corridor.width_m = 1.6;
     config.forest.corridors.push_back(corridor);
   }
-  return worlds::build_world(config, options.seed);
+  return worlds::build_world(config, options.seed, sim::load_airframe().radius_m);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ class FlightPicturesTest : public ::testing::Test {
     const sim::Scenario scenario =
         sim::load_scenario(AREX_SOURCE_DIR "/scenarios/forest_small.yaml", {}, {});
     world_ = std::make_unique<worlds::World>(scenario.build_world());
-    X_WO_ = sim::start_pose(*world_, scenario.config.stack.vehicle);
+    X_WO_ = sim::start_pose(*world_);
   }
   static void TearDownTestSuite() { world_.reset(); }
 

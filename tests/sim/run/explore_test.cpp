@@ -51,6 +51,15 @@ TEST(Explore, ASmallGarageIsExploredDownItsRamp) {
   EXPECT_LT(result.flight.poses.back().X_OB.p.z(), -8);  // on the floor below
 }
 
+// A triangle of the small forest: what is scored is what is explored, not the box around it, which
+// is twice as large.
+TEST(Explore, APolygonIsExploredWhole) {
+  const FlightResult result =
+      fly("forest_small", 1, 2, {"exploration.bounds.polygon_m=[[-11, -9], [11, -9], [0, 9]]"});
+  expect_explored(result, 0.95, 0.8);
+  EXPECT_LT(result.coverage->area_m2, 0.5 * 22 * 18);
+}
+
 // The explorer reads off the voltage that the battery is not full, and turns back for it.
 TEST(Explore, ComesHomeForTheBatteryWithTheReserve) {
   const FlightResult result =

@@ -12,7 +12,6 @@
 namespace arex::sim {
 namespace {
 
-using worlds::Bounds;
 using worlds::MeshBuilder;
 using worlds::SurfaceClass;
 using worlds::World;
@@ -39,7 +38,7 @@ World two_rooms() {
 
 const Pose kStart{Mat3::Identity(), {3.05, 2.05, 1.05}};
 constexpr double kRadius = 0.35;
-const Bounds kEverywhere{{-20, -20, -20}, {20, 20, 20}};  // in O
+const ScoredRegion kEverywhere{{{-20, -20}, {20, 20}, {}}, -20, 20, Vec3::Zero()};
 
 // A map of [x0, x1] x [-10, 10] in O, all free.
 OccupancyMap2D free_map(double x0, double x1) {
@@ -52,12 +51,12 @@ OccupancyMap2D free_map(double x0, double x1) {
 }
 
 CoverageScorer room_scorer(const World& world, const Scene& scene, const Pose& X_WO = kStart,
-                           const Bounds& bounds_O = kEverywhere) {
+                           const ScoredRegion& region = kEverywhere) {
   CoverageConfig config;
   config.band_above_terrain = false;
   config.band_low_m = -1.0;
   config.band_high_m = 1.0;
-  return {config, world, scene, X_WO, bounds_O, kRadius};
+  return {config, world, scene, X_WO, region, kRadius};
 }
 
 TEST(CoverageScorer, CountsTheReachableAreaOfTheOpenRoomOnly) {
@@ -112,11 +111,41 @@ TEST(CoverageScorer, HalfARoomIsAHalfInAnyFrame) {
 TEST(CoverageScorer, ScoresInsideTheExplorationBoundsOnly) {
   const World world = two_rooms();
   const Scene scene(world);
-  Bounds bounds = kEverywhere;
-  bounds.high.x() = 0;  // W x = 2.98: the cell whose middle is 2.95 is the last
+  ScoredRegion region = kEverywhere;
+  region.bounds.high_m.x() = 0;  // W x = 2.98: the cell whose middle is 2.95 is the last
   const CoverageScorer scorer =
-      room_scorer(world, scene, {Mat3::Identity(), {2.98, 2.05, 1.05}}, bounds);
+      room_scorer(world, scene, {Mat3::Identity(), {2.98, 2.05, 1.05}}, region);
   EXPECT_NEAR(scorer.result().area_m2, 2.6 * 3.2, 1e-9);
+}
+
+// The polygon is what is explored, not the box around it: half of the room, cut along a diagonal.
+TEST(CoverageScorer, ScoresInsideTheExplorationPolygonOnly) {
+  const World world = two_rooms();
+  const Scene scene(world);
+  const CoverageScorer whole = room_scorer(world, scene);
+  ScoredRegion region = kEverywhere;
+  region.bounds.polygon_m = {
+      {-3.05, -2.05}, {2.95, -2.05}, {2.95, 1.95}};  // O: corners of the room
+  const CoverageScorer scorer = room_scorer(world, scene, kStart, region);
+  std::size_t inside = 0;
+  for (const Vec3f& cell : whole.area_cells_W()) {
+    inside += region.bounds.contains((cell.cast<double>() - kStart.p).head<2>());
+  }
+  EXPECT_EQ(scorer.area_cells_W().size(), inside);
+  EXPECT_NEAR(scorer.result().area_m2, 0.5 * whole.result().area_m2, 0.5);
+  for (const SurfaceSample& sample : scorer.samples()) {
+    const Vec3 p_O = sample.p_W.cast<double>() - kStart.p;
+    EXPECT_TRUE(region.bounds.is_near(p_O.head<2>(), 0.5));
+  }
+}
+
+// Exploring begins where the entry legs end: behind the wall there is another room.
+TEST(CoverageScorer, CountsWhatIsReachedFromWhereExploringBegins) {
+  const World world = two_rooms();
+  const Scene scene(world);
+  ScoredRegion region = kEverywhere;
+  region.start_O = {4.5, 0, 0};  // x = 7.55 in W
+  EXPECT_NEAR(room_scorer(world, scene, kStart, region).result().area_m2, 2.2 * 3.2, 1e-9);
 }
 
 TEST(CoverageScorer, AStartWithoutRoomIsRefused) {

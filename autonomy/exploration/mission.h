@@ -52,7 +52,9 @@ struct MissionConfig {
     f("settle_s", settle_s, "standing still before arming");
     f("max_time_s", max_time_s, "the mission fails when it is not over by then");
     f("entry_m", entry_m, "x, y, z in O: straight legs flown before exploring");
-    f("land_at_start", land_at_start, "an exploration comes home; false: it lands where it ends");
+    f("land_at_start", land_at_start,
+      "an exploration keeps energy for the way home and lands there; false: it lands where it "
+      "ends");
     f("return_tries", return_tries, "failed ways home before it lands where it is");
     f("yaw_rates_radps", yaw_rates_radps, "of a yaw burst, one after the other");
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");

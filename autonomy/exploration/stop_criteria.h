@@ -20,9 +20,10 @@ inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_ca
 
 struct StopConfig {
   double min_area_m2 = 0.3;
-  double reserve_fraction = 0.2;  ///< reference.md, section 1: 80 % discharge
-  bool return_home = true;
-  double return_speed_mps = 1.0;  ///< half the planner's limit: it brakes and turns on the way
+  double reserve_fraction = 0.2;       ///< reference.md, section 1: 80 % discharge
+  double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
+  bool return_home = true;             ///< handed down from mission.land_at_start
+  double return_speed_mps = 1.0;  ///< handed down: the fraction of planning.local's speed limit
   double landing_s = 20;
   double landing_clearance_m = 1.0;  ///< the vehicle's 0.3 m and a drift of twice that
   double energy_margin = 1.15;
@@ -31,8 +32,8 @@ struct StopConfig {
   void fields(auto& f) {
     f("min_area_m2", min_area_m2, "stop when no candidate has more unknown area than this");
     f("reserve_fraction", reserve_fraction, "of the battery's energy, not to be touched");
-    f("return_home", return_home, "keep energy for the way home; false: it lands where it is");
-    f("return_speed_mps", return_speed_mps, "mean speed on the way home");
+    f("return_speed_fraction", return_speed_fraction,
+      "mean speed on the way home, part of planning.local.max_speed_mps");
     f("landing_s", landing_s, "time to turn round, hover and land");
     f("landing_clearance_m", landing_clearance_m,
       "of the place from obstacles where it does not land at home: the nearest such one");
@@ -40,7 +41,8 @@ struct StopConfig {
     f("detour_factor", detour_factor, "on the straight distance, where no known path leads home");
     f.check(min_area_m2 >= 0, "min_area_m2 >= 0");
     f.check(reserve_fraction >= 0 && reserve_fraction < 1, "reserve_fraction in [0, 1)");
-    f.check(return_speed_mps > 0, "return_speed_mps > 0");
+    f.check(return_speed_fraction > 0 && return_speed_fraction <= 1,
+            "0 < return_speed_fraction <= 1");
     f.check(landing_s >= 0, "landing_s >= 0");
     f.check(landing_clearance_m >= 0, "landing_clearance_m >= 0");
     f.check(energy_margin >= 1, "energy_margin >= 1");

@@ -8,17 +8,22 @@
 namespace arex {
 
 struct ViewpointConfig {
-  double clearance_m = 0.65;  ///< the planner's inflation and a margin
+  double clearance_margin_m = 0.15;
+  double standoff_margin_m = 0.1;
+  double clearance_m = 0.65;  ///< handed down: planning.inflation_m + clearance_margin_m
   double max_distance_m = 3.0;
-  double standoff_m = 0.6;  ///< keeps the inflated goal out of the unknown
+  double standoff_m = 0.6;  ///< handed down: planning.inflation_m + standoff_margin_m
 
   void fields(auto& f) {
-    f("clearance_m", clearance_m, "of a viewpoint from obstacles, where one can be had");
+    f("clearance_margin_m", clearance_margin_m,
+      "of a viewpoint from obstacles beyond planning.inflation_m, where one can be had");
     f("max_distance_m", max_distance_m, "of a viewpoint from what it is to see");
-    f("standoff_m", standoff_m, "of a viewpoint from what it is to see, where one can be had");
-    f.check(clearance_m >= 0, "clearance_m >= 0");
-    f.check(standoff_m >= 0, "standoff_m >= 0");
-    f.check(max_distance_m >= standoff_m, "max_distance_m >= standoff_m");
+    f("standoff_margin_m", standoff_margin_m,
+      "of a viewpoint from what it is to see beyond planning.inflation_m, where one can be had: "
+      "keeps the inflated goal out of the unknown");
+    f.check(clearance_margin_m >= 0, "clearance_margin_m >= 0");
+    f.check(standoff_margin_m >= 0, "standoff_margin_m >= 0");
+    f.check(max_distance_m > 0, "max_distance_m > 0");
   }
 };
 

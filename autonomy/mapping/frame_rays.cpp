@@ -52,7 +52,7 @@ void cast_frame(const RegisteredScan& scan, double range_m, const VehicleConfig&
                 const CellBox& clip, RayCaster& rays, double lone_range_m) {
   rays.begin(scan.origin_end_O, clip);
   const double range2 = range_m * range_m;
-  const double body2 = vehicle.own_returns_m * vehicle.own_returns_m;
+  const double body2 = vehicle.own_returns_m() * vehicle.own_returns_m();
   const double lone2 = lone_range_m * lone_range_m;
   const Vec3 p_LB_O = scan.p_OB - scan.origin_end_O;
   // From B, both when the point was fired.
@@ -85,7 +85,7 @@ void cast_frame(const RegisteredDepth& depth, const LocalGridConfig& config,
   const PinholeCamera& camera = depth.image->camera;
   const Vec3 origin = depth.X_OC.p;
   rays.begin(origin, clip);
-  const double body2 = vehicle.own_returns_m * vehicle.own_returns_m;
+  const double body2 = vehicle.own_returns_m() * vehicle.own_returns_m();
   const Vec3 p_OB = depth.X_OC * vehicle.X_BC().inverse().p;
   for (int v = 0; v < camera.height; v += config.depth_hit_stride_px) {
     for (int u = 0; u < camera.width; u += config.depth_hit_stride_px) {

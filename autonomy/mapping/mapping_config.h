@@ -61,7 +61,7 @@ struct LocalGridConfig {
     f("depth_max_m", depth_max_m, "farther depth only says what is free (sigma 0.09 m there)");
     f("depth_hit_stride_px", depth_hit_stride_px, "every n-th pixel of every n-th row is a point");
     f("depth_ray_stride_px", depth_ray_stride_px, "every n-th pixel of every n-th row is a ray");
-    f("sensor", sensor, "evidence of hits and misses");
+    f("sensor", sensor, "evidence of hits and misses, in the local grid and in the OctoMap");
     f.check(lidar_frames >= 1 && lidar_frames <= 10, "1 <= lidar_frames <= 10");
     f.check(confirm_frames >= 2 && confirm_frames <= 11, "2 <= confirm_frames <= 11");
     f.check(size_m.minCoeff() >= 1 && size_m.maxCoeff() <= 40, "1 <= size_m <= 40");
@@ -84,6 +84,7 @@ constexpr std::array<std::string_view, 2> enum_names(BandReference) {
 struct GlobalMapConfig {
   Vec3 low_m{-30, -25, -3};
   Vec3 high_m{30, 25, 9};
+  double margin_m = 5;
   double range_m = 20;
   BandReference band = BandReference::kGround;
   double band_low_m = 0.4;
@@ -91,11 +92,13 @@ struct GlobalMapConfig {
   int min_free_cells = 3;
   double ground_max_slope = 0.5;
   int ground_support = 3;
-  SensorModelConfig sensor;
+  SensorModelConfig sensor;  ///< handed down from mapping.sensor
 
   void fields(auto& f) {
-    f("low_m", low_m, "lower corner of the mapped box in O");
-    f("high_m", high_m, "upper corner of the mapped box in O");
+    f("low_m", low_m, "lower corner of the mapped box in O; unless given, around where it flies");
+    f("high_m", high_m, "upper corner of the mapped box in O; unless given, around where it flies");
+    f("margin_m", margin_m,
+      "of a box that is not given, along x and y beyond exploration bounds, entry and waypoints");
     f("range_m", range_m, "LiDAR rays count up to here");
     f("band", band, "height band of the 2D map: above the ground (forest) or absolute (garage)");
     f("band_low_m", band_low_m,
@@ -104,9 +107,9 @@ struct GlobalMapConfig {
     f("min_free_cells", min_free_cells, "a column is free when so many of its band are");
     f("ground_max_slope", ground_max_slope, "steeper rises are objects, not ground");
     f("ground_support", ground_support, "occupied voxels in two layers of a tile that make ground");
-    f("sensor", sensor, "evidence of hits and misses");
     f.check((low_m.array() < high_m.array()).all(), "low_m < high_m");
     f.check((high_m - low_m).maxCoeff() <= 400, "high_m - low_m <= 400");
+    f.check(margin_m >= 0 && margin_m <= 50, "0 <= margin_m <= 50");
     f.check(range_m > 0 && range_m <= 24, "0 < range_m <= 24");
     f.check(band_low_m < band_high_m, "band_low_m < band_high_m");
     f.check(min_free_cells >= 1 && min_free_cells <= 8, "1 <= min_free_cells <= 8");

@@ -16,9 +16,9 @@ struct VehicleConfig {
   double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
   double torque_ratio_m = 0.0143;      ///< rotor drag torque per thrust
   double radius_m = 0.305;  ///< of the sphere about B that holds the airframe, propellers included
-  /// Returns nearer to B are the vehicle's own, to the maps: its radius and 3 sigma of the range to
-  /// propellers that the LiDAR sees edge-on (35 mm at 87 degrees of incidence).
-  double own_returns_m = 0.41;
+  /// 3 sigma of the range to propellers that the LiDAR sees edge-on (35 mm at 87 degrees of
+  /// incidence).
+  double own_returns_margin_m = 0.105;
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
   double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
@@ -26,6 +26,8 @@ struct VehicleConfig {
                          0.07};   ///< p_BC, the left imager: above the LiDAR (paper, III-A)
   double camera_pitch_rad = 0.0;  ///< positive looks down
 
+  /// Returns nearer to B are the vehicle's own, to the maps.
+  [[nodiscard]] double own_returns_m() const { return radius_m + own_returns_margin_m; }
   /// LiDAR frame in B: rotated about y.
   [[nodiscard]] Pose X_BL() const { return {so3::Exp({0, lidar_pitch_rad, 0}), lidar_position_m}; }
   /// Camera frame in B: z forward, x right, y down.
@@ -41,7 +43,8 @@ struct VehicleConfig {
     f("thrust_coefficient", thrust_coefficient, "rotor thrust per squared speed, N/(rad/s)^2");
     f("torque_ratio_m", torque_ratio_m, "rotor drag torque per thrust");
     f("radius_m", radius_m, "sphere about B that holds the airframe");
-    f("own_returns_m", own_returns_m, "returns nearer to B are the vehicle's own, to the maps");
+    f("own_returns_margin_m", own_returns_margin_m,
+      "returns within this of the sphere are the vehicle's own, to the maps");
     f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
     f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
     f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, III-A)");
@@ -49,7 +52,7 @@ struct VehicleConfig {
     f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
     f.check(mass_kg > 0, "mass_kg > 0");
     f.check(radius_m > 0, "radius_m > 0");
-    f.check(own_returns_m >= radius_m, "own_returns_m >= radius_m");
+    f.check(own_returns_margin_m >= 0, "own_returns_margin_m >= 0");
     f.check(thrust_coefficient > 0, "thrust_coefficient > 0");
   }
 };

@@ -110,15 +110,15 @@ double clearance(const GridView& grid, const Vec3& p, double max_m) {
   return best;
 }
 
-std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start, double true_radius_m,
+std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start, double vehicle_radius_m,
                               double max_distance_m) {
   const Eigen::Vector3i centre = grid.cell_of(start);
   if (!grid.contains(centre)) return {};
   const int radius = static_cast<int>(std::ceil(max_distance_m / grid.resolution_m));
-  const int reach = static_cast<int>(std::ceil(2.0 * true_radius_m / grid.resolution_m)) + 1;
+  const int reach = static_cast<int>(std::ceil(2.0 * vehicle_radius_m / grid.resolution_m)) + 1;
   const ClearanceCube cube(grid, centre, radius, reach);
   const int source = cube.index(Eigen::Vector3i::Zero());
-  const double allowed = std::min(true_radius_m / grid.resolution_m, cube.clearance(source));
+  const double allowed = std::min(vehicle_radius_m / grid.resolution_m, cube.clearance(source));
 
   // Dijkstra; ties by index.
   const auto cells = static_cast<std::size_t>(cube.count());
@@ -159,14 +159,14 @@ std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start, double tr
 }
 
 GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double reach_m,
-                                 double true_radius_m, double yield_m) {
+                                 double vehicle_radius_m, double yield_m) {
   cells_.assign(grid.cells, grid.cells + grid.size.cast<std::ptrdiff_t>().prod());
   GridView shrunk = grid;
   shrunk.cells = cells_.data();
   const Eigen::Vector3i centre = grid.cell_of(p);
   if (!grid.contains(centre)) return shrunk;
   const int radius = static_cast<int>(std::ceil(reach_m / grid.resolution_m));
-  const double least = true_radius_m / grid.resolution_m + 0.5;  // from centre to centre
+  const double least = vehicle_radius_m / grid.resolution_m + 0.5;  // from centre to centre
   const ClearanceCube cube(grid, centre, radius, static_cast<int>(std::ceil(least)) + 2);
   const double here = cube.clearance(cube.index(Eigen::Vector3i::Zero()));
   const double kept = std::max(std::min(least, here), here - yield_m / grid.resolution_m);

@@ -23,7 +23,7 @@ namespace arex {
 /// than the true radius, no cell on the way may be closer than the start. Polyline from `start` to
 /// a free cell's centre; empty if there is none within `max_distance_m`.
 [[nodiscard]] std::vector<Vec3> escape_path(const GridView& grid, const Vec3& start,
-                                            double true_radius_m, double max_distance_m);
+                                            double vehicle_radius_m, double max_distance_m);
 
 /// The grid as a vehicle that is inside the inflation sees it: points seen since it planned, or one
 /// cell of noise, have grown over it, and it flies on from there. Within `reach_m` of it (a cube)
@@ -34,7 +34,7 @@ class ShrunkInflation {
  public:
   /// A copy of the grid; valid until the next call.
   [[nodiscard]] GridView around(const GridView& grid, const Vec3& p, double reach_m,
-                                double true_radius_m, double yield_m);
+                                double vehicle_radius_m, double yield_m);
 
  private:
   std::vector<std::uint8_t> cells_;

@@ -18,7 +18,8 @@ inline const std::array<std::string_view, 2>& enum_names(GuideMode) {
 
 struct GuideConfig {
   GuideMode mode = GuideMode::kAstar;
-  double obstacle_distance_m = 0.6;  ///< kept from occupied cells: inflation and a cell
+  double margin_m = 0.1;             ///< beyond the inflation: a cell
+  double obstacle_distance_m = 0.6;  ///< handed down: planning.inflation_m + margin_m
   double comfort_distance_m = 1.5;   ///< nearer than this costs more, linearly
   double comfort_weight = 2.0;       ///< at obstacle_distance_m, per metre flown
   double unknown_weight = 2.0;       ///< extra cost of a metre through the unknown
@@ -26,13 +27,13 @@ struct GuideConfig {
 
   void fields(auto& f) {
     f("mode", mode, "global guide: straight line, or A* over the 2D map");
-    f("obstacle_distance_m", obstacle_distance_m, "distance kept from occupied cells");
+    f("margin_m", margin_m, "kept from occupied cells beyond planning.inflation_m");
     f("comfort_distance_m", comfort_distance_m, "distance below which flying costs more");
     f("comfort_weight", comfort_weight, "extra cost of a metre at the obstacle distance");
     f("unknown_weight", unknown_weight, "extra cost of a metre through unknown cells");
     f("max_expansions", max_expansions, "A* expansions");
-    f.check(obstacle_distance_m >= 0, "obstacle_distance_m >= 0");
-    f.check(comfort_distance_m >= obstacle_distance_m, "comfort_distance_m >= obstacle_distance_m");
+    f.check(margin_m >= 0, "margin_m >= 0");
+    f.check(comfort_distance_m >= 0, "comfort_distance_m >= 0");
     f.check(unknown_weight >= 0, "unknown_weight >= 0");
   }
 };

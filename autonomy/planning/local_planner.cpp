@@ -367,7 +367,7 @@ void LocalPlanner::slow_down(const GridView& grid, const PlanRequest& request, P
   const double slower = request.max_speed_mps > 0 ? request.max_speed_mps : config_.max_speed_mps;
   KnownPrefix prefix{0, 0, true};
   if (config_.stop_in_known_space) {
-    prefix = known_prefix(grid, result.trajectory, 0.0, config_.true_radius_m);
+    prefix = known_prefix(grid, result.trajectory, 0.0, config_.vehicle_radius_m);
   }
   if (prefix.whole && slower >= config_.max_speed_mps) return;
   const double braking = 0.8 * config_.max_acceleration_mps2;
@@ -409,7 +409,8 @@ void LocalPlanner::slow_down(const GridView& grid, const PlanRequest& request, P
 
 PlanResult LocalPlanner::plan(const GridView& grid, const PlanRequest& request) {
   const bool blocked = is_blocked(grid, request.start.p);
-  if (blocked && clearance(grid, request.start.p, config_.true_radius_m) < config_.true_radius_m) {
+  if (blocked &&
+      clearance(grid, request.start.p, config_.vehicle_radius_m) < config_.vehicle_radius_m) {
     PlanResult result;
     result.status = PlanStatus::kStartInInflation;
     result.goal = request.goal;
@@ -431,7 +432,7 @@ PlanResult LocalPlanner::plan_through_inflation(const GridView& grid, const Plan
       config_.leave_distance_m +
       stopping_distance(request.start.v.norm(), config_.max_acceleration_mps2, 0.0);
   PlanResult result = plan_from_free(
-      shrunk_.around(grid, request.start.p, reach, config_.true_radius_m, yield_m), request);
+      shrunk_.around(grid, request.start.p, reach, config_.vehicle_radius_m, yield_m), request);
   result.diagnostics.start_inflated = true;
   return result;
 }
@@ -464,7 +465,7 @@ PlanResult LocalPlanner::plan_escape(const GridView& grid, const MotionState& st
   result.status = PlanStatus::kStartInInflation;
   result.goal = start.p;
   const std::vector<Vec3> path =
-      escape_path(grid, start.p, config_.true_radius_m, config_.escape_distance_m);
+      escape_path(grid, start.p, config_.vehicle_radius_m, config_.escape_distance_m);
   if (path.size() < 2) return result;
   MotionLimits limit = config_.limits();
   limit.max_speed_mps = std::max(config_.escape_speed_mps, start.v.norm());

@@ -43,7 +43,7 @@ struct LocalPlannerConfig {
   double timing_jerk_mps3 = 30.0;     ///< build-up of acceleration along a path
   int timing_attempts = 5;
 
-  double true_radius_m = 0.3;  ///< the vehicle's (models/arex/README.md)
+  double vehicle_radius_m = 0.305;  ///< handed down from vehicle.radius_m
   double max_goal_shift_m = 1.5;
   double leave_distance_m = 0.3;  ///< with the stopping distance: where the inflation is shrunk
   double escape_distance_m = 1.5;
@@ -87,7 +87,6 @@ struct LocalPlannerConfig {
     f("evasive_knot_span_s", evasive_knot_span_s, "of stops for which that reacts too late");
     f("timing_jerk_mps3", timing_jerk_mps3, "build-up of acceleration along a path");
     f("timing_attempts", timing_attempts, "tries to time a path, each slower");
-    f("true_radius_m", true_radius_m, "of the vehicle: inflation shrinks to it for an escape");
     f("max_goal_shift_m", max_goal_shift_m, "of a goal inside the inflation");
     f("leave_distance_m", leave_distance_m,
       "and the stopping distance: about a start in the inflation, shrunk to the room it has");

@@ -240,9 +240,9 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
 /// count if the trajectory leaves it soon and comes, until then, neither nearer than the true
 /// radius nor nearer than it is by more than a cell: stopping inside would be worse.
 std::optional<double> ReplanMachine::next_collision(const GridView& grid, double t_s) const {
-  const double radius = std::min(planner_.config().true_radius_m,
+  const double radius = std::min(planner_.config().vehicle_radius_m,
                                  clearance(grid, current_.spline.position(t_s),
-                                           planner_.config().true_radius_m + grid.resolution_m) -
+                                           planner_.config().vehicle_radius_m + grid.resolution_m) -
                                      grid.resolution_m);
   for (const TimeInterval& stretch : find_collisions(grid, current_.spline, t_s)) {
     bool leaves = stretch.begin_s <= t_s && stretch.end_s < t_s + config_.emergency_time_s;
@@ -259,8 +259,8 @@ bool ReplanMachine::must_replan_for_space(const GridView& grid, Stamp now) const
   if (!planner.stop_in_known_space) return false;
   const double speed = current_.state(now).v.norm();
   if (speed <= planner.unknown_speed_mps * (1 + planner.limit_tolerance)) return false;
-  const KnownPrefix prefix =
-      known_prefix(grid, current_.spline, std::max(0.0, current_.time(now)), planner.true_radius_m);
+  const KnownPrefix prefix = known_prefix(grid, current_.spline, std::max(0.0, current_.time(now)),
+                                          planner.vehicle_radius_m);
   const double reaction = config_.planning_latency_s + 1.0 / config_.check_rate_hz;
   return !prefix.whole &&
          prefix.length_m < stopping_distance(speed, planner.max_acceleration_mps2, reaction);

@@ -47,7 +47,7 @@ struct ReplanConfig {
   double max_tracking_error_m = 1.0;   ///< beyond, plans start at the vehicle, not the setpoint
   double goal_tolerance_m = 0.3;
   double target_timeout_s = 120.0;
-  double degenerate_speed_mps = 0.8;  ///< 40 % of the limit, as on the mission's straight legs
+  double degenerate_speed_mps = 0.8;  ///< handed down: caution's fraction of the speed limit
   int tries_per_recovery = 3;         ///< plans tried before the next rung
   double back_off_m = 2.0;            ///< along the flown path
   double back_off_speed_mps = 0.7;
@@ -65,7 +65,6 @@ struct ReplanConfig {
     f("max_tracking_error_m", max_tracking_error_m, "beyond, plans start at the vehicle");
     f("goal_tolerance_m", goal_tolerance_m, "the target counts as reached");
     f("target_timeout_s", target_timeout_s, "after which a target is given up");
-    f("degenerate_speed_mps", degenerate_speed_mps, "speed limit while the odometry is degenerate");
     f("tries_per_recovery", tries_per_recovery, "failed plans before the next recovery");
     f("back_off_m", back_off_m, "distance of a retreat along the flown path");
     f("back_off_speed_mps", back_off_speed_mps, "speed of that");
@@ -74,7 +73,6 @@ struct ReplanConfig {
     f.check(check_rate_hz > 0, "check_rate_hz > 0");
     f.check(horizon_m > 0, "horizon_m > 0");
     f.check(planning_latency_s >= 0, "planning_latency_s >= 0");
-    f.check(degenerate_speed_mps > 0, "degenerate_speed_mps > 0");
     f.check(tries_per_recovery > 0, "tries_per_recovery > 0");
     f.check(track_points > 1, "track_points > 1");
   }

@@ -5,21 +5,21 @@
 namespace arex {
 
 Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
-    : config_(config),
+    : config_(with_shared_values(config)),
       jobs_(jobs),
-      lidar_inertial_(config.odometry.lidar_inertial, config.vehicle),
+      lidar_inertial_(config_.odometry.lidar_inertial, config_.vehicle),
       odometry_lane_(jobs.add_lane("odometry")),
-      lidar_watch_(config.odometry.watch),
-      energy_(config.exploration.explorer.consumption),
-      perception_(config, jobs),
-      explorer_(config.exploration.explorer, config.mapping.resolution_m, seed),
+      lidar_watch_(config_.odometry.watch),
+      energy_(config_.exploration.explorer.consumption),
+      perception_(config_, jobs),
+      explorer_(config_.exploration.explorer, config_.mapping.resolution_m, seed),
       explorer_lane_(jobs.add_lane("exploration")),
-      mission_(config.mission,
+      mission_(config_.mission,
                [this](EventKind kind, const std::string& detail) { report(kind, detail); }),
-      legs_(config.path, config.caution),
-      navigator_(config.planning, config.control.attitude_lag_s, jobs, seed),
-      tracker_(config.control, config.vehicle),
-      control_period_(from_seconds(1 / config.control.rate_hz)) {}
+      legs_(config_.path, config_.caution),
+      navigator_(config_.planning, config_.control.attitude_lag_s, jobs, seed),
+      tracker_(config_.control, config_.vehicle),
+      control_period_(from_seconds(1 / config_.control.rate_hz)) {}
 
 void Stack::add_imu(const ImuSample& imu) {
   if (config_.odometry.source == OdometryConfig::Source::kLidarInertial) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "control/timed_path.h"
@@ -117,7 +118,9 @@ struct StackConfig {
   TrackerConfig control;
 
   void fields(auto& f) {
-    f("vehicle", vehicle, "what the stack believes of its vehicle");
+    f("vehicle", vehicle,
+      "what the stack believes of its vehicle, by weighing and calibrating; the truth is "
+      "models/arex/arex.xml and physics");
     f("odometry", odometry, "pose and velocity");
     f("mapping", mapping, "maps of the surroundings");
     f("planning", planning, "from a goal to a trajectory");
@@ -132,6 +135,23 @@ struct StackConfig {
     f.check(!exploration.explorer.follow_ground || mapping.global.band == BandReference::kGround,
             "exploration.follow_ground only with mapping.global.band: ground");
   }
+
+  /// Where exploring begins, in O: after the entry legs.
+  [[nodiscard]] Vec3 explored_from() const {
+    return mission.entry_m.empty() ? Vec3::Zero() : mission.entry_m.back();
+  }
+
+  /// The rule that explored region, start and mapped box break together; empty: none. Not among the
+  /// checks of fields(), for the box may be worked out only after reading (set_mapped_box).
+  [[nodiscard]] std::string broken_region_rule() const;
 };
+
+/// Hands what one section says to the modules below others that need it too: a number has one home,
+/// and whoever changes it there has changed it for all.
+[[nodiscard]] StackConfig with_shared_values(StackConfig config);
+
+/// The box to map where a scenario names none: bounds, entry and waypoints with the margin around
+/// them. Heights stay.
+void set_mapped_box(const StackConfig& asked, GlobalMapConfig& box);
 
 }  // namespace arex

@@ -64,7 +64,7 @@ TEST(GlobalMap, HasOctoMapsStatesAfterTheSameHitsAndMisses) {
   for (const RegisteredScan& scan : walk(1, 9, 900)) {
     cast_frame(scan, config.range_m, vehicle, map.box(), rays);
     map.add_frame(rays);
-    const VoxelSets sets = cast_brute_force(rays_of(scan, config.range_m, vehicle.own_returns_m),
+    const VoxelSets sets = cast_brute_force(rays_of(scan, config.range_m, vehicle.own_returns_m()),
                                             kResolution, map.box());
     for (const Voxel& v : sets.passed) oracle.updateNode(to_key(v), false);
     for (const Voxel& v : sets.hit) oracle.updateNode(to_key(v), true);

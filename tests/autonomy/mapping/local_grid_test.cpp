@@ -121,7 +121,7 @@ TEST(LocalGrid, AgreesWithBruteForceWhileItRolls) {
         const Kind kind = k % 4 == 3 ? Kind::kDepth : Kind::kLidar;
         grid.add_frame(rays, kind, k * kFrame);
         oracle.add(
-            cast_brute_force(rays_of(scan, 20, VehicleConfig{}.own_returns_m), kResolution, box),
+            cast_brute_force(rays_of(scan, 20, VehicleConfig{}.own_returns_m()), kResolution, box),
             kind);
         if (k % 3 == 1) expect_equal(*grid.snapshot(), oracle, box);
       }
@@ -167,7 +167,7 @@ TEST(LocalGrid, OneFrameWithoutDepthIsThePapersSparseMap) {
     grid.add_frame(rays, Kind::kLidar, k * kFrame);
     std::set<Voxel> points, obstacles;
     for (const Vec3f& p : *scan.points_O) {
-      if ((p.cast<double>() - scan.p_OB).norm() < VehicleConfig{}.own_returns_m) continue;
+      if ((p.cast<double>() - scan.p_OB).norm() < VehicleConfig{}.own_returns_m()) continue;
       points.insert(voxel_of(p.cast<double>(), kResolution));
     }
     const auto now = grid.snapshot();

@@ -114,14 +114,14 @@ TEST(FrameRays, InterpolatesOriginsCutsAtTheRangeAndLeavesOutTheBody) {
       scan.fractions = fractions;
     }
     cast_frame(scan, 6.0, vehicle, everywhere, caster);
-    const std::vector<TestRay> rays = rays_of(scan, 6.0, vehicle.own_returns_m);
+    const std::vector<TestRay> rays = rays_of(scan, 6.0, vehicle.own_returns_m());
     EXPECT_LE(rays.size(), points->size() - points->size() / 50);
     const VoxelSets expected = cast_brute_force(rays, 0.1, everywhere);
     EXPECT_EQ(sets_of(caster, everywhere).hit, expected.hit);
     EXPECT_EQ(sets_of(caster, everywhere).passed, expected.passed);
     for (const Voxel& v : expected.hit) {
       const Vec3 p = 0.1 * Vec3(v[0] + 0.5, v[1] + 0.5, v[2] + 0.5);
-      EXPECT_GT((p - scan.p_OB).norm(), vehicle.own_returns_m - 0.3);
+      EXPECT_GT((p - scan.p_OB).norm(), vehicle.own_returns_m() - 0.3);
     }
   }
 }

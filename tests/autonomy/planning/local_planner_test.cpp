@@ -117,7 +117,7 @@ TEST(LocalPlanner, GrazesTheInflationOfWhatItCannotAvoidAnyMore) {
     const UniformBspline& s = result.trajectory;
     EXPECT_LT((s.velocity(0) - request.start.v).norm(), 1e-9);
     for (double t = 0; t < s.duration_s(); t += 1e-3) {
-      ASSERT_GE(clearance(grid.view(), s.position(t), 1.0), config.true_radius_m - 1e-9) << t;
+      ASSERT_GE(clearance(grid.view(), s.position(t), 1.0), config.vehicle_radius_m - 1e-9) << t;
       ASSERT_LE(s.acceleration(t).norm(), kTolerance * config.max_acceleration_mps2);
     }
   }

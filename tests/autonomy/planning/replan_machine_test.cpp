@@ -238,7 +238,7 @@ TEST(ReplanMachine, PlansOnFromWithinTheInflationWithoutComingNearer) {
     EXPECT_EQ(flight.count(PlannerEventKind::kEmergencyStop), 0) << aside;
     EXPECT_EQ(flight.count(PlannerEventKind::kPlanFailed), 0) << aside;
     EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1) << aside;
-    EXPECT_GE(nearest, LocalPlannerConfig().true_radius_m - 1e-3) << aside;
+    EXPECT_GE(nearest, LocalPlannerConfig().vehicle_radius_m - 1e-3) << aside;
   }
 }
 

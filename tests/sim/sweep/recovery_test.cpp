@@ -221,7 +221,10 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
              "list:\n"
              "  - {name: walled in, base: " AREX_SOURCE_DIR
              "/scenarios/inflation.yaml, "
-             "world.vehicle_radius_m: 1.5}\n"
+             "world.kind: forest, world.forest.size_m: [30, 30], "
+             "world.forest.start_radius_m: 0.8, world.forest.tree_density_per_m2: 0.8, "
+             "world.forest.min_spacing_m: 0.8, "
+             "world.forest.clearings: [{centre_m: [8, 8], radius_m: 4}]}\n"
              "  - {name: endless, base: " AREX_SOURCE_DIR
              "/scenarios/waypoints.yaml}\n"
              "timeout_s: 3\nretries: 1\n");

@@ -1,0 +1,55 @@
+#include "run/moved_keys.h"
+
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace arex::sim {
+namespace {
+
+struct MovedKey {
+  std::string_view old_key;  ///< dotted
+  std::string_view instead;
+};
+
+constexpr std::array kMovedKeys{
+    MovedKey{"exploration.stop.return_home", "mission.land_at_start"},
+    MovedKey{"exploration.stop.return_speed_mps",
+             "exploration.stop.return_speed_fraction, of planning.local.max_speed_mps"},
+    MovedKey{"exploration.space.travel_radius_m", "planning.inflation_m"},
+    MovedKey{"exploration.viewpoint.clearance_m",
+             "exploration.viewpoint.clearance_margin_m, beyond planning.inflation_m"},
+    MovedKey{"exploration.viewpoint.standoff_m",
+             "exploration.viewpoint.standoff_margin_m, beyond planning.inflation_m"},
+    MovedKey{"planning.guide.obstacle_distance_m",
+             "planning.guide.margin_m, beyond planning.inflation_m"},
+    MovedKey{"planning.local.true_radius_m", "vehicle.radius_m"},
+    MovedKey{"planning.replan.degenerate_speed_mps",
+             "caution.degenerate_speed_fraction, of planning.local.max_speed_mps"},
+    MovedKey{"mapping.global.sensor", "mapping.sensor"},
+    MovedKey{"vehicle.own_returns_m", "vehicle.own_returns_margin_m, beyond vehicle.radius_m"},
+    MovedKey{"world.vehicle_radius_m", "nothing: the radius is the model's (models/arex/arex.xml)"},
+};
+
+/// The entry at a dotted key; null if the file says nothing there.
+const ConfigNode::Entry* entry_at(const ConfigNode& node, std::string_view key) {
+  const std::size_t dot = key.find('.');
+  for (const ConfigNode::Entry& entry : node.entries) {
+    if (entry.key != key.substr(0, dot)) continue;
+    return dot == std::string_view::npos ? &entry : entry_at(entry.value, key.substr(dot + 1));
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void refuse_moved_keys(const ConfigNode& scenario) {
+  for (const MovedKey& moved : kMovedKeys) {
+    const ConfigNode::Entry* entry = entry_at(scenario, moved.old_key);
+    if (!entry) continue;
+    throw ConfigError(entry->where + ": '" + std::string(moved.old_key) +
+                      "' has no value of its own any more; set " + std::string(moved.instead));
+  }
+}
+
+}  // namespace arex::sim

@@ -370,7 +370,7 @@ TEST(Mapper, IsDeterministicAndLeavesOutDepthOnRequest) {
 
 TEST(MappingConfig, ListsItsParameters) {
   EXPECT_GE(list_parameters(LocalGridConfig{}).size(), 15U);
-  EXPECT_GE(list_parameters(GlobalMapConfig{}).size(), 13U);
+  EXPECT_GE(list_parameters(GlobalMapConfig{}).size(), 10U);
   LocalGridConfig config;
   EXPECT_THROW(read_config(parse_yaml("lidar_frames: 11", "x"), config), ConfigError);
 }

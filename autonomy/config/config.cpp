@@ -1,49 +1,24 @@
 #include "config/config.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <sstream>
+#include <utility>
+
+#include "config/text.h"
+#include "config/yaml_reader.h"
 
 namespace arex {
 namespace {
 
 constexpr std::string_view kOverride = "--set";
-
-std::string position(const std::string& name, const YAML::Mark& mark) {
-  return name + ":" + std::to_string(mark.is_null() ? 1 : mark.line + 1);
-}
-
-ConfigNode convert(const YAML::Node& yaml, const std::string& name) {
-  ConfigNode node;
-  node.where = position(name, yaml.Mark());
-  if (yaml.IsScalar()) {
-    node.kind = ConfigNode::Kind::kScalar;
-    node.scalar = yaml.Scalar();
-  } else if (yaml.IsSequence()) {
-    node.kind = ConfigNode::Kind::kSequence;
-    for (const auto& item : yaml) node.items.push_back(convert(item, name));
-  } else if (yaml.IsMap()) {
-    node.kind = ConfigNode::Kind::kMap;
-    for (const auto& pair : yaml) {
-      const std::string where = position(name, pair.first.Mark());
-      if (!pair.first.IsScalar()) config_detail::fail(where, "a key must be a plain word");
-      const std::string& key = pair.first.Scalar();
-      if (node.find(key)) {
-        config_detail::fail(where, "duplicate key '" + key + "', expected each key once");
-      }
-      node.entries.push_back({key, where, convert(pair.second, name)});
-      // yaml-cpp places an absent value on the next line.
-      if (pair.second.IsNull()) node.entries.back().value.where = where;
-    }
-  }
-  return node;
-}
+constexpr std::size_t kLongestKey = 64;  // that is worth a guess
 
 // Levenshtein distance, for 'did you mean'.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -69,7 +44,7 @@ std::size_t unlikeness(std::string_view given, std::string_view known) {
 std::string shown(const ConfigNode& node) {
   switch (node.kind) {
     case ConfigNode::Kind::kScalar:
-      return "'" + node.scalar + "'";
+      return "'" + shortened(node.scalar) + "'";
     case ConfigNode::Kind::kMap:
       return "a map";
     case ConfigNode::Kind::kSequence:
@@ -85,13 +60,75 @@ std::string shown(const ConfigNode& node) {
                                       std::string(expected));
 }
 
+// What an integer of this type can be; the bounds only where they are what is wrong.
 template <class T>
-bool parse_number(const std::string& text, T& out) {
-  const char* first = text.data();
-  const char* last = first + text.size();
-  if (text.size() > 1 && *first == '+') ++first;
-  const auto result = std::from_chars(first, last, out);
-  return result.ec == std::errc() && result.ptr == last;
+std::string integer_expected(const std::string& text, std::string_view plainly) {
+  const bool digits =
+      text.find_first_not_of("0123456789", text.find_first_of("+-") == 0) == std::string::npos;
+  if (!digits || text.empty() || (text[0] == '-' && std::is_unsigned_v<T>)) {
+    return std::string(plainly);
+  }
+  return "an integer from " + std::to_string(std::numeric_limits<T>::min()) + " to " +
+         std::to_string(std::numeric_limits<T>::max());
+}
+
+// The clock counts nanoseconds in 64 bits, and cells of a map are counted in 32: beyond these
+// bounds a number means nothing to them.
+struct Magnitude {
+  std::string_view suffix, unit;
+  double least, most;  // of the absolute value; zero is always one
+};
+constexpr std::array<Magnitude, 3> kMagnitudes{
+    {{"_s", "s", 1e-9, 1e9}, {"_hz", "Hz", 1e-9, 1e9}, {"_m", "m", 0, 1e6}}};
+
+void check_magnitude(const ConfigNode& node, std::string_view key, double value) {
+  for (const Magnitude& m : kMagnitudes) {
+    const std::string_view stem = key.substr(0, key.size() - std::min(key.size(), m.suffix.size()));
+    if (!key.ends_with(m.suffix) || stem.ends_with("_per") || value == 0) continue;
+    const double size = std::abs(value);
+    if (size >= m.least && size <= m.most) continue;
+    const std::string bound = size > m.most
+                                  ? "at most " + config_detail::format_scalar(m.most)
+                                  : "0, or at least " + config_detail::format_scalar(m.least);
+    wrong_type(node, key, bound + " " + std::string(m.unit));
+  }
+}
+
+// Marks a value and all in it as given by this override.
+void set_order(ConfigNode& node, int order) {
+  node.order = order;
+  for (auto& entry : node.entries) set_order(entry.value, order);
+  for (auto& item : node.items) set_order(item, order);
+}
+
+// What stands at a dotted key, or nothing.
+const ConfigNode::Entry* find_entry(const ConfigNode& root, std::string_view dotted_key) {
+  const ConfigNode* node = &root;
+  const ConfigNode::Entry* found = nullptr;
+  while (node) {
+    const std::size_t dot = std::min(dotted_key.find('.'), dotted_key.size());
+    const auto entry = std::find_if(node->entries.begin(), node->entries.end(), [&](const auto& e) {
+      return e.key == dotted_key.substr(0, dot);
+    });
+    if (entry == node->entries.end()) return nullptr;
+    found = &*entry;
+    if (dot == dotted_key.size()) return found;
+    dotted_key.remove_prefix(dot + 1);
+    node = &entry->value;
+  }
+  return nullptr;
+}
+
+std::vector<std::string> split_key(const std::string& dotted_key) {
+  std::vector<std::string> keys{""};
+  for (const char c : dotted_key) {
+    if (c == '.') {
+      keys.emplace_back();
+    } else {
+      keys.back() += c;
+    }
+  }
+  return keys;
 }
 
 }  // namespace
@@ -103,40 +140,57 @@ const ConfigNode* ConfigNode::find(std::string_view key) const {
   return nullptr;
 }
 
+ConfigError::ConfigError(const std::string& message) : std::runtime_error(printable(message)) {}
+
 ConfigNode parse_yaml(const std::string& text, const std::string& name) {
-  try {
-    const YAML::Node yaml = YAML::Load(text);
-    ConfigNode node = convert(yaml, name);
-    if (node.kind == ConfigNode::Kind::kNull) node.kind = ConfigNode::Kind::kMap;  // empty file
-    if (node.kind != ConfigNode::Kind::kMap) {
-      config_detail::fail(name + ":1", "the file holds " + shown(node) + ", expected keys");
-    }
-    return node;
-  } catch (const YAML::Exception& error) {
-    config_detail::fail(position(name, error.mark), "not valid YAML: " + error.msg);
+  ConfigNode node = config_detail::read_yaml(text, name, config_detail::Positions::kLines);
+  if (node.kind == ConfigNode::Kind::kNull) {  // an empty text
+    node.kind = ConfigNode::Kind::kMap;
+    node.where = name + ":1";
   }
+  if (node.kind != ConfigNode::Kind::kMap) {
+    config_detail::fail(name + ":1", "the file holds " + shown(node) + ", expected keys");
+  }
+  return node;
 }
 
 ConfigNode load_yaml(const std::filesystem::path& file) {
+  const std::string name = file.string();
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    config_detail::fail(file.string() + ":1", "is a directory, expected a YAML file");
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::is_directory(status)) {
+    config_detail::fail(name + ":1", "is a directory, expected a YAML file");
   }
-  std::ifstream stream(file);
-  if (!stream) {
-    config_detail::fail(file.string() + ":1", "cannot be read, expected a YAML file");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    config_detail::fail(name + ":1", "is a pipe, a socket or a device, expected a YAML file");
   }
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return parse_yaml(text.str(), file.string());
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(config_detail::kLongestYaml + 1, '\0');  // one more than it takes says too long
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!stream && !stream.eof()) {
+    config_detail::fail(name + ":1", "cannot be read, expected a YAML file");
+  }
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
+    config_detail::fail(name + ":1", "the file is empty, expected keys ('{}' for none)");
+  }
+  return parse_yaml(text, name);
 }
 
 void set_value(ConfigNode& root, const std::string& dotted_key, const std::string& where,
                ConfigNode value) {
+  const int order = ++root.order;
+  set_order(value, order);
   ConfigNode* node = &root;
   std::string* leaf_where = nullptr;
-  std::istringstream keys(dotted_key);
-  for (std::string key; std::getline(keys, key, '.');) {
+  for (const std::string& key : split_key(dotted_key)) {
+    if (key.empty()) config_detail::fail(where, "a key of '" + dotted_key + "' is empty");
+    const bool section =
+        node->kind == ConfigNode::Kind::kMap || node->kind == ConfigNode::Kind::kNull;
+    if (!section) {
+      config_detail::fail(where, "goes into " + shown(*node) + " of " + node->where +
+                                     ", expected a map of keys there");
+    }
     node->kind = ConfigNode::Kind::kMap;
     auto entry = std::find_if(node->entries.begin(), node->entries.end(),
                               [&](const auto& e) { return e.key == key; });
@@ -144,35 +198,36 @@ void set_value(ConfigNode& root, const std::string& dotted_key, const std::strin
       node->entries.push_back({key, where, {}});
       entry = std::prev(node->entries.end());
       entry->value.where = where;
+      entry->value.order = order;
     }
     node = &entry->value;
     leaf_where = &entry->where;
   }
   *node = std::move(value);
-  if (leaf_where) *leaf_where = where;
+  *leaf_where = where;
 }
 
 void apply_override(ConfigNode& root, const std::string& assignment) {
   const auto equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0) {
-    config_detail::fail(std::string(kOverride) + " " + assignment, "expected key=value");
+    config_detail::fail(std::string(kOverride) + " " + shortened(assignment), "expected key=value");
   }
-  const std::string path = assignment.substr(0, equals);
-  const std::string where = std::string(kOverride) + " " + path;
-  ConfigNode value;
-  try {
-    value = convert(YAML::Load(assignment.substr(equals + 1)), where);
-  } catch (const YAML::Exception& error) {
-    config_detail::fail(where, "not valid YAML: " + error.msg);
-  }
-  // Inside an override every position is the override itself.
-  const auto relabel = [&](auto&& self, ConfigNode& n) -> void {
-    n.where = where;
-    for (auto& entry : n.entries) entry.where = where, self(self, entry.value);
-    for (auto& item : n.items) self(self, item);
+  const std::string key = assignment.substr(0, equals);
+  const std::string where = std::string(kOverride) + " " + shortened(key);
+  set_value(root, key, where,
+            config_detail::read_yaml(assignment.substr(equals + 1), where,
+                                     config_detail::Positions::kName));
+}
+
+std::string given_last(const ConfigNode& section) {
+  const ConfigNode* newest = &section;
+  const auto visit = [&newest](const auto& self, const ConfigNode& node) -> void {
+    if (node.order > newest->order) newest = &node;
+    for (const auto& entry : node.entries) self(self, entry.value);
+    for (const auto& item : node.items) self(self, item);
   };
-  relabel(relabel, value);
-  set_value(root, path, where, std::move(value));
+  for (const auto& entry : section.entries) visit(visit, entry.value);
+  return newest->where;
 }
 
 std::string write_yaml(const std::vector<ParameterInfo>& parameters) {
@@ -224,23 +279,31 @@ void parse_scalar(const ConfigNode& node, std::string_view key, bool& out) {
 
 void parse_scalar(const ConfigNode& node, std::string_view key, int& out) {
   expect_kind(node, key, ConfigNode::Kind::kScalar, "an integer");
-  if (!parse_number(node.scalar, out)) wrong_type(node, key, "an integer");
+  const auto value = parse_int(node.scalar);
+  if (!value) wrong_type(node, key, integer_expected<int>(node.scalar, "an integer"));
+  out = *value;
 }
 
 void parse_scalar(const ConfigNode& node, std::string_view key, std::uint64_t& out) {
   constexpr std::string_view kExpected = "an integer that is not negative";
   expect_kind(node, key, ConfigNode::Kind::kScalar, kExpected);
-  if (!parse_number(node.scalar, out)) wrong_type(node, key, kExpected);
+  const auto value = parse_uint64(node.scalar);
+  if (!value) wrong_type(node, key, integer_expected<std::uint64_t>(node.scalar, kExpected));
+  out = *value;
 }
 
 void parse_scalar(const ConfigNode& node, std::string_view key, double& out) {
   constexpr std::string_view kExpected = "a finite number";
   expect_kind(node, key, ConfigNode::Kind::kScalar, kExpected);
-  if (!parse_number(node.scalar, out) || !std::isfinite(out)) wrong_type(node, key, kExpected);
+  const auto value = parse_double(node.scalar);
+  if (!value) wrong_type(node, key, kExpected);
+  check_magnitude(node, key, *value);
+  out = *value;
 }
 
 void parse_scalar(const ConfigNode& node, std::string_view key, std::string& out) {
   expect_kind(node, key, ConfigNode::Kind::kScalar, "a text");
+  if (printable(node.scalar) != node.scalar) wrong_type(node, key, "a text that can be printed");
   out = node.scalar;
 }
 
@@ -257,8 +320,8 @@ std::size_t parse_choice(const ConfigNode& node, std::string_view key,
 void reject_unknown(const ConfigNode& node, const std::vector<std::string>& known) {
   for (const ConfigNode::Entry& entry : node.entries) {
     if (std::find(known.begin(), known.end(), entry.key) != known.end()) continue;
-    std::string message = "unknown key '" + entry.key + "'";
-    if (!known.empty()) {
+    std::string message = "unknown key '" + shortened(entry.key) + "'";
+    if (!known.empty() && entry.key.size() <= kLongestKey) {
       const auto nearest =
           std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
             return unlikeness(entry.key, a) < unlikeness(entry.key, b);
@@ -270,13 +333,15 @@ void reject_unknown(const ConfigNode& node, const std::vector<std::string>& know
 }
 
 std::string locate_rule(const ConfigNode& node, std::string_view rule) {
-  const ConfigNode::Entry* first = nullptr;
-  std::size_t first_at = std::string_view::npos;
-  for (const ConfigNode::Entry& entry : node.entries) {
-    const std::size_t at = rule.find(entry.key);
-    if (at < first_at) first = &entry, first_at = at;
+  static constexpr std::string_view kOfKeys = "abcdefghijklmnopqrstuvwxyz0123456789_.";
+  const ConfigNode::Entry* blamed = nullptr;
+  for (std::size_t at = 0; at < rule.size();) {
+    const std::size_t begin = std::min(rule.find_first_of(kOfKeys, at), rule.size());
+    at = std::min(rule.find_first_not_of(kOfKeys, begin), rule.size());
+    const ConfigNode::Entry* entry = find_entry(node, rule.substr(begin, at - begin));
+    if (entry && (!blamed || entry->value.order > blamed->value.order)) blamed = entry;
   }
-  return first ? first->where : node.where;
+  return blamed ? blamed->where : node.where;
 }
 
 std::string format_scalar(bool value) { return value ? "true" : "false"; }

@@ -25,10 +25,10 @@
 /// nested config structs. Units are the name's suffix (_m, _mps, _rad, _hz, ...).
 namespace arex {
 
-/// Bad input. what() is one line, `FILE:LINE: what is wrong, what is expected`.
+/// Bad input. what() is one printable line, `FILE:LINE: what is wrong, what is expected`.
 class ConfigError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit ConfigError(const std::string& message);
 };
 
 /// A parsed YAML value that remembers where it stands.
@@ -37,6 +37,7 @@ struct ConfigNode {
   struct Entry;
   Kind kind = Kind::kNull;
   std::string where;  ///< "FILE:LINE", or "--set key"
+  int order = 0;      ///< 0: the file says it; else which override, counted at the root
   std::string scalar;
   std::vector<Entry> entries;     ///< of a map, in the file's order
   std::vector<ConfigNode> items;  ///< of a sequence
@@ -49,15 +50,21 @@ struct ConfigNode::Entry {
   ConfigNode value;
 };
 
-/// Reads a file. @throws ConfigError for a missing file, a syntax error or a duplicate key.
+/// Reads a file. @throws ConfigError for what is no file, what holds nothing, and for what
+/// parse_yaml refuses.
 ConfigNode load_yaml(const std::filesystem::path& file);
-/// The same from text; `name` stands for the file in messages.
+/// The same from text; `name` stands for the file in messages. One document of UTF-8, bounded in
+/// length, depth and number of values; aliases are followed, tags and merge keys are refused.
 ConfigNode parse_yaml(const std::string& text, const std::string& name);
 /// Puts `value` at a dotted key, over what stands there; messages will name `where`.
+/// @throws ConfigError if something else than a section stands on the way.
 void set_value(ConfigNode& root, const std::string& dotted_key, const std::string& where,
                ConfigNode value);
 /// Applies one `--set a.b=value` over what the file says. @throws ConfigError if it has no '='.
 void apply_override(ConfigNode& root, const std::string& assignment);
+
+/// Where the newest value of a section was given: the last override in it, or else the section.
+std::string given_last(const ConfigNode& section);
 
 /// One parameter, as `arex params` prints it.
 struct ParameterInfo {
@@ -87,7 +94,8 @@ void expect_kind(const ConfigNode& node, std::string_view key, ConfigNode::Kind 
 void expect_length(const ConfigNode& node, std::string_view key, std::size_t length);
 /// Throws for the first key of `node` that is not in `known`, naming the nearest known one.
 void reject_unknown(const ConfigNode& node, const std::vector<std::string>& known);
-/// Where the value that a broken rule speaks of was given: the first known key named in the rule.
+/// Where the value that a broken rule speaks of was given: of the keys that the rule names (dotted
+/// from here) the one that an override gave last, or else the first.
 std::string locate_rule(const ConfigNode& node, std::string_view rule);
 
 std::string format_scalar(bool value);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 
 namespace arex {
 
@@ -23,10 +24,16 @@ inline constexpr Stamp kNanosecondsPerTick = 1'000'000;  ///< lockstep: 1 kHz
 constexpr double to_seconds(Stamp stamp) {
   return static_cast<double>(stamp) / static_cast<double>(kNanosecondsPerSecond);
 }
-/// The nearest nanosecond.
+/// Longer than any run, 73 years; sums of a few still are Stamps.
+inline constexpr Stamp kForever = std::numeric_limits<Stamp>::max() / 4;
+
+/// The nearest nanosecond; of what is longer than kForever, that. The only conversion.
+/// @pre seconds is a number
 constexpr Stamp from_seconds(double seconds) {
-  return static_cast<Stamp>(seconds * static_cast<double>(kNanosecondsPerSecond) +
-                            (seconds < 0 ? -0.5 : 0.5));
+  const double nanoseconds = seconds * static_cast<double>(kNanosecondsPerSecond);
+  if (!(nanoseconds < static_cast<double>(kForever))) return kForever;
+  if (nanoseconds < -static_cast<double>(kForever)) return -kForever;
+  return static_cast<Stamp>(nanoseconds + (seconds < 0 ? -0.5 : 0.5));
 }
 
 /// Standard gravity, m/s^2; the only definition of it.

@@ -8,16 +8,7 @@ namespace arex::app {
 namespace {
 
 sim::Scenario load(const ScenarioArguments& arguments) {
-  if (!arguments.file.empty()) {
-    return sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
-  }
-  sim::Scenario defaults;
-  defaults.source = parse_yaml("", "defaults");
-  for (const std::string& assignment : arguments.overrides) {
-    apply_override(defaults.source, assignment);
-  }
-  read_config(defaults.source, defaults.config);
-  return defaults;
+  return sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ worlds::World Scenario::build_world() const {
     world = worlds::build_world(config.world, config.seed, load_airframe().radius_m);
   } catch (const ConfigError& error) {
     const ConfigNode* node = source.find("world");
-    throw ConfigError((node ? node->where : source.where) + ": " + error.what());
+    throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
   }
   const bool explores = config.stack.mission.kind == MissionConfig::Kind::kExplore;
   if (explores &&
@@ -119,13 +119,10 @@ std::string broken_region_rule(const ScenarioConfig& config) {
 
 }  // namespace
 
-Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                       std::optional<std::uint64_t> seed) {
+Scenario make_scenario(const std::string& name, ConfigNode source) {
   Scenario scenario;
-  scenario.name = file.stem().string();
-  scenario.source = load_yaml(file);
-  for (const std::string& assignment : overrides) apply_override(scenario.source, assignment);
-  if (seed) apply_override(scenario.source, "seed=" + std::to_string(*seed));
+  scenario.name = name;
+  scenario.source = std::move(source);
   refuse_moved_keys(scenario.source);
   ScenarioConfig asked;
   read_config(scenario.source, asked);
@@ -136,6 +133,22 @@ Scenario load_scenario(const std::filesystem::path& file, const std::vector<std:
                         "out of range: expected " + rule);
   }
   return scenario;
+}
+
+void set_seed(ConfigNode& source, std::uint64_t seed, const std::string& where) {
+  ConfigNode value;
+  value.kind = ConfigNode::Kind::kScalar;
+  value.where = where;
+  value.scalar = std::to_string(seed);
+  set_value(source, "seed", where, std::move(value));
+}
+
+Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+                       std::optional<std::uint64_t> seed) {
+  ConfigNode source = file.empty() ? parse_yaml("", "defaults") : load_yaml(file);
+  for (const std::string& assignment : overrides) apply_override(source, assignment);
+  if (seed) set_seed(source, *seed, "--seed");
+  return make_scenario(file.stem().string(), std::move(source));
 }
 
 }  // namespace arex::sim

@@ -32,8 +32,8 @@ struct DeviceConfig {
     f("lidar", lidar, "fire the LiDAR");
     f("lidar_latency_s", lidar_latency_s, "end of a LiDAR frame to its delivery");
     f("depth_latency_s", depth_latency_s, "exposure of a depth frame to its delivery");
-    f.check(lidar_latency_s >= 0, "lidar_latency_s >= 0");
-    f.check(depth_latency_s >= 0, "depth_latency_s >= 0");
+    f.check(lidar_latency_s >= 0 && lidar_latency_s <= 60, "0 <= lidar_latency_s <= 60");
+    f.check(depth_latency_s >= 0 && depth_latency_s <= 60, "0 <= depth_latency_s <= 60");
   }
 };
 
@@ -91,7 +91,8 @@ struct ScenarioConfig {
                 scans_hz * stack.odometry.latency_s <= 1,
             "odometry.latency_s <= 1 / lidar.rate_hz");
     f.check(!stack.mapping.enabled || (scans_hz + frames_hz) * stack.mapping.latency_s <= 1,
-            "mapping.latency_s <= 1 / (LiDAR and depth frames a second)");
+            "mapping.latency_s <= 1 / (lidar.rate_hz + lesser of depth.rate_hz, "
+            "mapping.depth_rate_hz)");
   }
 };
 
@@ -113,7 +114,18 @@ struct Scenario {
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
 Pose start_pose(const worlds::World& world);
 
-/// Reads a scenario, applies `--set` and `--seed`, checks everything. @throws ConfigError.
+/// The scenario that `source` asks for, checked, with what follows from it (such as the battery
+/// that the stack believes in). Whatever runs, sweeps, prints or checks a scenario has it from
+/// here.
+/// @throws ConfigError.
+Scenario make_scenario(const std::string& name, ConfigNode source);
+
+/// Puts a seed over what `source` says; messages will name `where`.
+void set_seed(ConfigNode& source, std::uint64_t seed, const std::string& where);
+
+/// Reads a scenario, applies `--set` and `--seed`, and makes it.
+/// @param file empty: nothing but the defaults
+/// @throws ConfigError.
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
                        std::optional<std::uint64_t> seed);
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <cmath>
+
+#include "config/text.h"
 
 namespace arex::sim {
 namespace {
@@ -12,7 +14,8 @@ using config_detail::fail;
 using config_detail::parse_scalar;
 using Kind = ConfigNode::Kind;
 
-constexpr std::uint64_t kMostSeedsOfARange = 100'000;  // a slip of the pen, not a sweep
+constexpr int kMostRetries = 100;
+constexpr double kMostExactInteger = 9007199254740992;  // 2^53: beyond, a double skips integers
 
 // A value of a scenario's key: what stands at it must be one key's, not a section's.
 Assignment read_assignment(const ConfigNode::Entry& entry) {
@@ -111,15 +114,19 @@ HypercubeAxis read_axis(const ConfigNode::Entry& entry) {
   if (axis.scale == HypercubeAxis::Scale::kLog && axis.low <= 0) {
     fail(node.where, "'" + axis.key + "' expects 0 < low on a log scale");
   }
+  if (axis.scale == HypercubeAxis::Scale::kInteger &&
+      std::max(std::abs(axis.low), std::abs(axis.high)) > kMostExactInteger) {
+    fail(node.where, "'" + axis.key + "' expects integers of at most 2^53");
+  }
   return axis;
 }
 
-int read_count(const ConfigNode& node, std::string_view key, int least) {
+int read_count(const ConfigNode& node, std::string_view key, int least, int most) {
   int count = 0;
   parse_scalar(node, key, count);
-  if (count < least) {
+  if (count < least || count > most) {
     fail(node.where, "'" + std::string(key) + "' is " + std::to_string(count) + ", expected " +
-                         std::to_string(least) + " or more");
+                         std::to_string(least) + " to " + std::to_string(most));
   }
   return count;
 }
@@ -131,7 +138,7 @@ LatinHypercube read_hypercube(const ConfigNode& node) {
   const ConfigNode* samples = node.find("samples");
   const ConfigNode* keys = node.find("keys");
   if (!samples || !keys) fail(node.where, "'latin_hypercube' expects samples: N and keys: {..}");
-  cube.samples = read_count(*samples, "samples", 1);
+  cube.samples = read_count(*samples, "samples", 1, kMostRuns);
   if (const ConfigNode* seed = node.find("seed")) parse_scalar(*seed, "seed", cube.seed);
   expect_kind(*keys, "keys", Kind::kMap, "a map of key: [low, high]");
   for (const auto& entry : keys->entries) cube.axes.push_back(read_axis(entry));
@@ -153,11 +160,14 @@ void read_seed(const ConfigNode& node, std::vector<std::uint64_t>& seeds) {
   parse_scalar(end, "seeds", first);
   end.scalar = node.scalar.substr(dots + 2);
   parse_scalar(end, "seeds", last);
-  if (last < first || last - first >= kMostSeedsOfARange) {
-    fail(node.where, "'seeds' has '" + node.scalar + "', expected FIRST..LAST, at most " +
-                         std::to_string(kMostSeedsOfARange));
+  const std::string given = "'seeds' has '" + shortened(node.scalar) + "', ";
+  if (last < first) fail(node.where, given + "expected FIRST..LAST");
+  const std::uint64_t more = last - first;  // by one less than their count, which may be 2^64
+  if (more >= kMostRuns - std::min<std::size_t>(seeds.size(), kMostRuns)) {
+    fail(node.where, given + "more than " + std::to_string(more) + " seeds, expected at most " +
+                         std::to_string(kMostRuns) + " in all");
   }
-  for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
+  for (std::uint64_t i = 0; i <= more; ++i) seeds.push_back(first + i);
 }
 
 std::vector<std::uint64_t> read_seeds(const ConfigNode& node) {
@@ -192,9 +202,13 @@ SweepFile load_sweep_file(const std::filesystem::path& file) {
   if (const auto* n = node.find("grid")) sweep.grid = read_grid(*n);
   if (const auto* n = node.find("list")) sweep.list = read_list(*n, folder);
   if (const auto* n = node.find("latin_hypercube")) sweep.hypercube = read_hypercube(*n);
-  if (const auto* n = node.find("seeds")) sweep.seeds = read_seeds(*n);
-  if (const auto* n = node.find("repeats")) sweep.repeats = read_count(*n, "repeats", 1);
-  if (const auto* n = node.find("retries")) sweep.retries = read_count(*n, "retries", 0);
+  if (const auto* n = node.find("seeds")) {
+    sweep.seeds = read_seeds(*n);
+    sweep.seeds_where = n->where;
+  }
+  if (const auto* n = node.find("repeats")) sweep.repeats = read_count(*n, "repeats", 1, kMostRuns);
+  if (const auto* n = node.find("retries"))
+    sweep.retries = read_count(*n, "retries", 0, kMostRetries);
   if (const auto* n = node.find("timeout_s")) {
     parse_scalar(*n, "timeout_s", sweep.timeout_s);
     if (sweep.timeout_s <= 0) fail(n->where, "'timeout_s' is not positive, expected seconds");

@@ -11,6 +11,9 @@
 /// Sweeps: many runs of `arex run`, each a process of its own, in one folder.
 namespace arex::sim {
 
+/// More runs are a slip of the pen: what each resolves to is kept in memory, 30 kB.
+inline constexpr int kMostRuns = 50'000;
+
 /// `key: value` of a scenario, with where the sweep file says it.
 struct Assignment {
   std::string key;  ///< dotted
@@ -65,7 +68,8 @@ struct SweepFile {
   std::vector<Variant> list;
   LatinHypercube hypercube;
   std::vector<GridAxis> grid;
-  std::vector<std::uint64_t> seeds{1};
+  std::vector<std::uint64_t> seeds;  ///< empty: each base's own
+  std::string seeds_where;
   int repeats = 1;          ///< of the same run: for times, or to see that nothing differs
   double timeout_s = 3600;  ///< wall time after which a run is killed
   int retries = 1;          ///< after a crash or a timeout; a mission that fails is no crash

@@ -132,6 +132,10 @@ std::string unquoted(const std::string& text) {
   return plain;
 }
 
+std::vector<Variant> variants_of(const SweepFile& sweep) {
+  return sweep.list.empty() ? std::vector<Variant>{Variant{}} : sweep.list;
+}
+
 /// Makes runs out of points.
 class Expander {
  public:
@@ -139,31 +143,34 @@ class Expander {
 
   void add(const BaseScenario& base, const Variant& variant, const Point& sample,
            const Point& grid) {
-    Scenario scenario;
-    scenario.name = base.file.stem().string();
-    scenario.source = node_of(base.file);
+    ConfigNode source = node_of(base.file);
     for (const Point* point : {&sweep_.set, &variant.values, &sample, &grid}) {
-      for (const Assignment& a : *point) set_value(scenario.source, a.key, a.where, a.value);
+      for (const Assignment& a : *point) set_value(source, a.key, a.where, a.value);
     }
-    scenario.config = {};
-    read_config(scenario.source, scenario.config);
+    const std::string name = base.file.stem().string();
+    if (sweep_.seeds.empty()) add(make_scenario(name, source), variant);
     for (const std::uint64_t seed : sweep_.seeds) {
-      scenario.config.seed = seed;
-      const auto parameters = list_parameters(scenario.config);
-      PlannedRun run;
-      run.scenario = scenario.name;
-      run.variant = variant.name;
-      run.values = values_of(parameters, scenario.source);
-      run.seed = seed;
-      run.resolved = write_yaml(parameters);
-      for (run.repeat = 1; run.repeat <= sweep_.repeats; ++run.repeat) {
-        run.id = run_id(plan_.build, run.scenario, run.repeat, run.resolved);
-        plan_.runs.push_back(run);
-      }
+      ConfigNode seeded = source;
+      set_seed(seeded, seed, sweep_.seeds_where);
+      add(make_scenario(name, std::move(seeded)), variant);
     }
   }
 
  private:
+  void add(const Scenario& scenario, const Variant& variant) {
+    const auto parameters = list_parameters(scenario.config);
+    PlannedRun run;
+    run.scenario = scenario.name;
+    run.variant = variant.name;
+    run.values = values_of(parameters, scenario.source);
+    run.seed = scenario.config.seed;
+    run.resolved = write_yaml(parameters);
+    for (run.repeat = 1; run.repeat <= sweep_.repeats; ++run.repeat) {
+      run.id = run_id(plan_.build, run.scenario, run.repeat, run.resolved);
+      plan_.runs.push_back(run);
+    }
+  }
+
   const ConfigNode& node_of(const std::filesystem::path& file) {
     const auto [at, added] = nodes_.try_emplace(file);
     if (added) at->second = load_yaml(file);
@@ -234,6 +241,17 @@ std::vector<const PlannedRun*> SweepPlan::flying_order() const {
   return order;
 }
 
+double count_runs(const SweepFile& sweep) {
+  double scenarios = 0;
+  for (const Variant& variant : variants_of(sweep)) {
+    scenarios += variant.base ? 1.0 : static_cast<double>(sweep.bases.size());
+  }
+  double points = std::max(1, sweep.hypercube.samples);
+  for (const GridAxis& axis : sweep.grid) points *= static_cast<double>(axis.values.size());
+  const auto seeds = static_cast<double>(std::max<std::size_t>(1, sweep.seeds.size()));
+  return scenarios * points * seeds * sweep.repeats;
+}
+
 SweepPlan expand(const SweepFile& sweep, const std::string& build) {
   SweepPlan plan;
   plan.name = sweep.name;
@@ -242,8 +260,13 @@ SweepPlan expand(const SweepFile& sweep, const std::string& build) {
   plan.repeats = sweep.repeats;
   plan.timeout_s = sweep.timeout_s;
   plan.retries = sweep.retries;
-  const std::vector<Variant> variants =
-      sweep.list.empty() ? std::vector<Variant>{Variant{}} : sweep.list;
+  const std::vector<Variant> variants = variants_of(sweep);
+  if (const double runs = count_runs(sweep); runs > kMostRuns) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.15g", runs);
+    fail(sweep.where, "asks for " + std::string(text.data()) + " runs, expected at most " +
+                          std::to_string(kMostRuns));
+  }
   const std::vector<Point> samples = hypercube_points(sweep.hypercube);
   const std::vector<Point> grid = grid_points(sweep.grid);
   Expander expander(sweep, plan);

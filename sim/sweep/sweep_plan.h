@@ -36,6 +36,9 @@ struct SweepPlan {
   [[nodiscard]] std::vector<const PlannedRun*> flying_order() const;
 };
 
+/// How many runs a sweep asks for; a double, for it may be any product.
+double count_runs(const SweepFile& sweep);
+
 /// Expands a sweep and checks every scenario of it. @throws ConfigError at the sweep file's line
 /// for a key that no scenario has or a value that it refuses.
 SweepPlan expand(const SweepFile& sweep, const std::string& build);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <set>
 
 #include "run/scenario.h"
@@ -197,9 +198,96 @@ TEST_F(PlanTest, RefusesBadInputWhereItStands) {
   EXPECT_EQ(error_of("base: none.yaml\n"),
             "sweep.yaml:1: 'base' is 'none.yaml', expected a scenario file relative to this file");
   EXPECT_EQ(error_of("base: one.yaml\nrepeats: 0\n"),
-            "sweep.yaml:2: 'repeats' is 0, expected 1 or more");
+            "sweep.yaml:2: 'repeats' is 0, expected 1 to 50000");
   EXPECT_EQ(error_of("base: one.yaml\nlatin_hypercube:\n  samples: 3\n  keys: {a.b: [2, 1]}\n"),
             "sweep.yaml:4: 'a.b' expects low < high");
+}
+
+TEST_F(PlanTest, WithoutSeedsEachBaseFliesItsOwn) {
+  write_text(folder_ / "seventh.yaml", "seed: 7\n");
+  const SweepPlan p = plan("base: [one.yaml, seventh.yaml]\n");
+  EXPECT_EQ(lines(p), (std::vector<std::string>{"one  1 1", "seventh  7 1"}));
+  EXPECT_EQ(value_in(p.runs[1], "seed"), "7");
+}
+
+TEST_F(PlanTest, ARunFliesWhatTheSameSettingsFlyAlone) {
+  write_text(folder_ / "three.yaml",
+             "seed: 18446744073709551615\nphysics: {battery: {cells: 6}}\n");
+  const std::vector<std::vector<std::string>> settings{
+      {},
+      {"physics.battery.capacity_ah=0.2"},
+      {"physics.battery.cells=6", "exploration.consumption.full_v=26"},
+      {"mapping.use_depth=false", "odometry.source=mocap", "imu.noise_free=true"},
+      {"mission.kind=waypoints", "mission.waypoints_m=[[1, 2, 1.5]]"},
+  };
+  for (const char* base : {"one", "two", "three"}) {
+    for (const auto& overrides : settings) {
+      std::string set;
+      for (const std::string& assignment : overrides) {
+        const auto equals = assignment.find('=');
+        set += (set.empty() ? "" : ", ") + assignment.substr(0, equals) + ": " +
+               assignment.substr(equals + 1);
+      }
+      const std::string file = std::string(base) + ".yaml";
+      const std::string sweep = "base: " + file + "\nset: {" + set + "}\n";
+      EXPECT_EQ(plan(sweep).runs.at(0).resolved,
+                load_scenario(folder_ / file, overrides, {}).resolved_yaml())
+          << sweep;
+      EXPECT_EQ(plan(sweep + "seeds: [012]\n").runs.at(0).resolved,
+                load_scenario(folder_ / file, overrides, 12).resolved_yaml())
+          << sweep;
+      write_text(folder_ / "resolved.yaml", plan(sweep).runs.at(0).resolved);
+      EXPECT_EQ(load_scenario(folder_ / "resolved.yaml", {}, {}).resolved_yaml(),
+                plan(sweep).runs.at(0).resolved);
+    }
+  }
+}
+
+TEST_F(PlanTest, SeedsReachToTheLastOfThem) {
+  const SweepPlan p =
+      plan("base: one.yaml\nseeds: [18446744073709551610..18446744073709551615, 010, 08]\n");
+  ASSERT_EQ(p.runs.size(), 8u);
+  EXPECT_EQ(p.runs[5].seed, std::numeric_limits<std::uint64_t>::max());
+  EXPECT_NE(p.runs[5].resolved.find("seed: 18446744073709551615\n"), std::string::npos);
+  EXPECT_EQ(p.runs[6].seed, 10u);
+  EXPECT_EQ(p.runs[7].seed, 8u);
+  EXPECT_EQ(error_of("base: one.yaml\nseeds: 0..18446744073709551615\n"),
+            "sweep.yaml:2: 'seeds' has '0..18446744073709551615', more than "
+            "18446744073709551615 seeds, expected at most 50000 in all");
+  EXPECT_NE(error_of("base: one.yaml\nseeds: [18446744073709551616]\n")
+                .find("an integer from 0 to 18446744073709551615"),
+            std::string::npos);
+  for (const char* seeds : {"5..4", "1..", "..3", "1...3", "1..2..3", "0x1..4", "a..b"}) {
+    EXPECT_EQ(error_of(std::string("base: one.yaml\nseeds: ") + seeds + "\n")
+                  .find("sweep.yaml:2: 'seeds' "),
+              0u)
+        << seeds;
+  }
+}
+
+TEST_F(PlanTest, SweepsThatNobodyCanFlyAreRefusedAtOnce) {
+  EXPECT_EQ(error_of("base: one.yaml\nlatin_hypercube:\n  samples: 1000000000\n"
+                     "  keys: {planning.inflation_m: [0.1, 1]}\n"),
+            "sweep.yaml:3: 'samples' is 1000000000, expected 1 to 50000");
+  EXPECT_EQ(error_of("base: one.yaml\nseeds: 1..40000\nrepeats: 40000\n"),
+            "sweep.yaml:1: asks for 1600000000 runs, expected at most 50000");
+  std::string axes;
+  for (const char* key : {"planning.inflation_m", "mission.max_time_s", "mapping.latency_s"}) {
+    axes += std::string("  ") + key + ": [";
+    for (int i = 1; i <= 1000; ++i) axes += (i > 1 ? ", " : "") + std::to_string(1e-5 * i);
+    axes += "]\n";
+  }
+  EXPECT_EQ(error_of("base: one.yaml\ngrid:\n" + axes),
+            "sweep.yaml:1: asks for 1000000000 runs, expected at most 50000");
+  EXPECT_EQ(error_of("base: one.yaml\nretries: 2147483647\n"),
+            "sweep.yaml:2: 'retries' is 2147483647, expected 0 to 100");
+  EXPECT_EQ(error_of("base: one.yaml\ntimeout_s: 1e300\n"),
+            "sweep.yaml:2: 'timeout_s' is '1e300', expected at most 1e+09 s");
+  EXPECT_EQ(error_of("a: &a [*a]\n").find("sweep.yaml:1: an alias"), 0u);
+  EXPECT_EQ(error_of("base: one.yaml\nlatin_hypercube: {samples: 2, keys: "
+                     "{exploration.detector.local_iterations: [0, 1e300, integer]}}\n"),
+            "sweep.yaml:2: 'exploration.detector.local_iterations' expects integers of at most "
+            "2^53");
 }
 
 TEST(ShippedSweeps, ExpandToWhatTheirCommentsSay) {

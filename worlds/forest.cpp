@@ -157,6 +157,20 @@ std::vector<TreeSite> place_trees(const ForestRecipe& recipe, std::uint64_t seed
   return sites;
 }
 
+double ForestRecipe::expected_triangles() const {
+  // Of a tree's trunk, of each branch or twig, of a fern and of a log, on average.
+  constexpr double kTrunk = 300, kBranch = 24, kFern = 60, kLog = 200;
+  const double of_tree =
+      kTrunk + kBranch * (tree.branches * (1.0 + tree.twigs_per_branch) + tree.low_branches) +
+      2.0 * tree.leaves;
+  const double per_m2 = tree_density_per_m2 * of_tree +
+                        undergrowth.shrub_density_per_m2 * 2.0 * undergrowth.shrub_leaves +
+                        undergrowth.fern_density_per_m2 * kFern +
+                        undergrowth.log_density_per_m2 * kLog +
+                        2 / (ground_spacing_m * ground_spacing_m);
+  return per_m2 * size_m.prod();
+}
+
 World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream ground_stream(seed, "worlds/forest/ground");

@@ -15,7 +15,7 @@ struct Clearing {
   void fields(auto& f) {
     f("centre_m", centre_m, "x, y from the start");
     f("radius_m", radius_m, "of the disc");
-    f.check(radius_m > 0, "radius_m > 0");
+    f.check(radius_m > 0 && radius_m <= 1000, "0 < radius_m <= 1000");
   }
 };
 
@@ -27,8 +27,8 @@ struct Corridor {
   void fields(auto& f) {
     f("points_m", points_m, "x, y of its corners, from the start");
     f("width_m", width_m, "of the way");
-    f.check(points_m.size() >= 2, "at least two points_m");
-    f.check(width_m > 0, "width_m > 0");
+    f.check(points_m.size() >= 2 && points_m.size() <= 1000, "points_m has 2 to 1000 corners");
+    f.check(width_m > 0 && width_m <= 1000, "0 < width_m <= 1000");
   }
 };
 
@@ -80,6 +80,10 @@ struct ForestRecipe {
   std::vector<Clearing> clearings;
   std::vector<Corridor> corridors;
 
+  static constexpr double kMostTriangles = 1e7;  ///< about 2 GB with the tree for the rays
+  /// Roughly, and rather too many: nothing is taken off for what is cleared.
+  [[nodiscard]] double expected_triangles() const;
+
   void fields(auto& f) {
     f("size_m", size_m, "extent of the ground along x and y, the start in its middle");
     f("edge_m", edge_m, "margin of the ground that bears no tree");
@@ -97,7 +101,7 @@ struct ForestRecipe {
     f.check(size_m.minCoeff() >= 10 && size_m.maxCoeff() <= 500, "10 <= size_m <= 500");
     f.check(edge_m >= 1 && 2 * edge_m < size_m.minCoeff(), "1 <= edge_m < half the least size_m");
     f.check(tree_density_per_m2 >= 0, "tree_density_per_m2 >= 0");
-    f.check(min_spacing_m > 0, "min_spacing_m > 0");
+    f.check(min_spacing_m >= 0.2 && min_spacing_m <= 100, "0.2 <= min_spacing_m <= 100");
     f.check(can_pack(tree_density_per_m2, min_spacing_m),
             "tree_density_per_m2 <= 0.637 / min_spacing_m^2 (denser cannot be packed)");
     f.check(relief_m >= 0 && relief_m <= 5, "0 <= relief_m <= 5");
@@ -105,6 +109,15 @@ struct ForestRecipe {
     f.check(roughness_m >= 0 && roughness_m <= 0.2, "0 <= roughness_m <= 0.2");
     f.check(ground_spacing_m >= 0.05 && ground_spacing_m <= 2, "0.05 <= ground_spacing_m <= 2");
     f.check(start_radius_m >= 0.5, "start_radius_m >= 0.5");
+    f.check(clearings.size() <= 1000, "at most 1000 clearings");
+    f.check(corridors.size() <= 100, "at most 100 corridors");
+    f.check(size_m.prod() <= 4e6 * ground_spacing_m * ground_spacing_m,
+            "size_m / ground_spacing_m at most 4e6 samples of the ground in all");
+    f.check(expected_triangles() <= kMostTriangles,
+            "at most 1e7 triangles (expected of size_m, tree_density_per_m2, tree.leaves, "
+            "tree.branches, tree.twigs_per_branch, undergrowth.shrub_density_per_m2, "
+            "undergrowth.shrub_leaves, undergrowth.fern_density_per_m2, "
+            "undergrowth.log_density_per_m2, ground_spacing_m)");
   }
 };
 

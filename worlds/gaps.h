@@ -44,7 +44,7 @@ struct GapsRecipe {
             "wall_distance_m > start_radius_m + pillar_radius_m");
     f.check(length_m > wall_distance_m + 2 * start_radius_m && length_m <= 500,
             "wall_distance_m + 2 start_radius_m < length_m <= 500");
-    f.check(pillar_radius_m > 0 && pillar_radius_m <= 2, "0 < pillar_radius_m <= 2");
+    f.check(pillar_radius_m >= 0.02 && pillar_radius_m <= 2, "0.02 <= pillar_radius_m <= 2");
     f.check(pillar_height_m > 0 && pillar_height_m <= 50, "0 < pillar_height_m <= 50");
     f.check(slot_m >= 0 && slot_m <= 0.3, "0 <= slot_m <= 0.3");
     f.check(gap_m > 0, "gap_m > 0");
@@ -53,6 +53,9 @@ struct GapsRecipe {
     f.check(field_radius_min_m > 0 && field_radius_min_m <= field_radius_max_m,
             "0 < field_radius_min_m <= field_radius_max_m");
     f.check(field_spacing_m > 2 * field_radius_max_m, "field_spacing_m > 2 field_radius_max_m");
+    f.check(field_spacing_m >= 0.2 && field_spacing_m <= 100, "0.2 <= field_spacing_m <= 100");
+    f.check(field_density_per_m2 * length_m * width_m <= 20000,
+            "at most 20000 pillars (field_density_per_m2 length_m width_m)");
     f.check(field_density_per_m2 >= 0 && can_pack(field_density_per_m2, field_spacing_m),
             "0 <= field_density_per_m2 <= 0.637 / field_spacing_m^2 (denser cannot be packed)");
   }
@@ -68,7 +71,7 @@ struct EmptyRecipe {
   void fields(auto& f) {
     f("size_m", size_m, "extent of the ground along x and y");
     f("height_m", height_m, "of the world's bounds above the ground");
-    f.check(size_m.minCoeff() >= 5 && size_m.maxCoeff() <= 1000, "5 <= size_m <= 1000");
+    f.check(size_m.minCoeff() >= 5 && size_m.maxCoeff() <= 500, "5 <= size_m <= 500");
     f.check(height_m > 0 && height_m <= 100, "0 < height_m <= 100");
   }
 };

@@ -58,8 +58,9 @@ struct TreeRecipe {
     f.check(trunk_radius_min_m <= trunk_radius_m && trunk_radius_m <= trunk_radius_max_m,
             "trunk_radius_min_m <= trunk_radius_m <= trunk_radius_max_m");
     f.check(trunk_radius_spread_m >= 0, "trunk_radius_spread_m >= 0");
+    f.check(trunk_radius_max_m <= 3, "trunk_radius_max_m <= 3");
     f.check(height_m >= 3 && height_m <= 60, "3 <= height_m <= 60");
-    f.check(height_spread_m >= 0, "height_spread_m >= 0");
+    f.check(height_spread_m >= 0 && height_spread_m <= 20, "0 <= height_spread_m <= 20");
     f.check(taper_exponent > 0 && taper_exponent <= 2, "0 < taper_exponent <= 2");
     f.check(root_flare >= 0 && root_flare <= 2, "0 <= root_flare <= 2");
     f.check(lean_rad >= 0 && lean_rad <= 0.3, "0 <= lean_rad <= 0.3");
@@ -71,7 +72,7 @@ struct TreeRecipe {
     f.check(low_branches >= 0 && low_branches <= 30, "0 <= low_branches <= 30");
     f.check(low_branch_low_m > 0 && low_branch_low_m <= low_branch_high_m,
             "0 < low_branch_low_m <= low_branch_high_m");
-    f.check(low_branch_length_m > 0, "low_branch_length_m > 0");
+    f.check(low_branch_length_m > 0 && low_branch_length_m <= 10, "0 < low_branch_length_m <= 10");
     f.check(twig_diameter_m > 0 && twig_diameter_m <= 2 * trunk_radius_min_m,
             "0 < twig_diameter_m <= 2 trunk_radius_min_m");
     f.check(leaves >= 0 && leaves <= 20000, "0 <= leaves <= 20000");

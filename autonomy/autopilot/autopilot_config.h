@@ -43,7 +43,7 @@ struct AhrsConfig {
     f("barometer_noise_m", barometer_noise_m, "of one barometer sample");
     f("still_noise_mps", still_noise_mps, "of the zero velocity while on the ground");
     f("gate_sigma", gate_sigma, "innovations beyond this many sigma are refused");
-    f.check(initialisation_s > 0, "initialisation_s > 0");
+    f.check(initialisation_s > 0 && initialisation_s <= 60, "0 < initialisation_s <= 60");
     f.check(correction_hz > 0 && correction_hz <= 500, "0 < correction_hz <= 500");
     f.check(drag_s_per_m > 0, "drag_s_per_m > 0");
     f.check(gate_sigma > 0, "gate_sigma > 0");

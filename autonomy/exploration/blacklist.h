@@ -17,7 +17,7 @@ struct BlacklistConfig {
     f("max_strikes", max_strikes, "a target that failed so often is given up for the mission");
     f.check(radius_m >= 0, "radius_m >= 0");
     f.check(duration_s >= 0, "duration_s >= 0");
-    f.check(max_strikes >= 1, "max_strikes >= 1");
+    f.check(max_strikes >= 1 && max_strikes <= 1000, "1 <= max_strikes <= 1000");
   }
 };
 

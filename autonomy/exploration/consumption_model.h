@@ -35,7 +35,7 @@ struct ConsumptionConfig {
     f.check(middle_charge > 0 && middle_charge < 1, "0 < middle_charge < 1");
     f.check(prior_power_w > 0, "prior_power_w > 0");
     f.check(prior_weight_s > 0, "prior_weight_s > 0");
-    f.check(speed_bin_mps > 0, "speed_bin_mps > 0");
+    f.check(speed_bin_mps >= 0.01, "speed_bin_mps >= 0.01");
   }
 };
 

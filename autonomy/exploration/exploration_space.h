@@ -22,8 +22,9 @@ struct SpaceConfig {
       "how far from the vehicle the known-free space may begin: cells below it may be unseen");
     f("information_radius_m", information_radius_m,
       "radius of the disc whose unknown area is f_I (rrt_exploration)");
-    f.check(start_reach_m >= 0, "start_reach_m >= 0");
-    f.check(information_radius_m > 0, "information_radius_m > 0");
+    f.check(start_reach_m >= 0 && start_reach_m <= 50, "0 <= start_reach_m <= 50");
+    f.check(information_radius_m > 0 && information_radius_m <= 50,
+            "0 < information_radius_m <= 50");
   }
 };
 

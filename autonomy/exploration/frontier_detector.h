@@ -25,12 +25,15 @@ struct FrontierDetectorConfig {
     f("vertex_spacing_m", vertex_spacing_m,
       "a vertex nearer than this to its tree adds nothing and is left out");
     f("cluster_bandwidth_m", cluster_bandwidth_m, "of the mean shift (rrt_exploration)");
-    f.check(local_step_m > 0, "local_step_m > 0");
-    f.check(global_step_m > 0, "global_step_m > 0");
-    f.check(local_iterations >= 0, "local_iterations >= 0");
-    f.check(global_iterations >= 0, "global_iterations >= 0");
-    f.check(vertex_spacing_m > 0, "vertex_spacing_m > 0");
-    f.check(cluster_bandwidth_m > 0, "cluster_bandwidth_m > 0");
+    f.check(local_step_m >= 0.02 && local_step_m <= 100, "0.02 <= local_step_m <= 100");
+    f.check(global_step_m >= 0.02 && global_step_m <= 100, "0.02 <= global_step_m <= 100");
+    f.check(local_iterations >= 0 && local_iterations <= 1000000,
+            "0 <= local_iterations <= 1000000");
+    f.check(global_iterations >= 0 && global_iterations <= 1000000,
+            "0 <= global_iterations <= 1000000");
+    f.check(vertex_spacing_m >= 0.02 && vertex_spacing_m <= 100, "0.02 <= vertex_spacing_m <= 100");
+    f.check(cluster_bandwidth_m >= 0.02 && cluster_bandwidth_m <= 100,
+            "0.02 <= cluster_bandwidth_m <= 100");
   }
 };
 

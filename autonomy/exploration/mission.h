@@ -60,7 +60,7 @@ struct MissionConfig {
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
     f("lost_hover_s", lost_hover_s,
       "level at hover thrust without odometry, then the autopilot lands");
-    f.check(yaw_burst_s > 0, "yaw_burst_s > 0");
+    f.check(yaw_burst_s >= 0.001, "yaw_burst_s >= 0.001 (a tick)");
     f.check(lost_hover_s >= 0, "lost_hover_s >= 0");
     f.check(takeoff_height_m > 0, "takeoff_height_m > 0");
     f.check(arrival_radius_m > 0, "arrival_radius_m > 0");
@@ -68,6 +68,7 @@ struct MissionConfig {
     f.check(hold_s >= 0, "hold_s >= 0");
     f.check(settle_s >= 0, "settle_s >= 0");
     f.check(max_time_s > 0, "max_time_s > 0");
+    f.check(return_tries >= 0, "return_tries >= 0");
   }
 };
 

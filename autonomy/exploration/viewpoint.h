@@ -21,9 +21,9 @@ struct ViewpointConfig {
     f("standoff_margin_m", standoff_margin_m,
       "of a viewpoint from what it is to see beyond planning.inflation_m, where one can be had: "
       "keeps the inflated goal out of the unknown");
-    f.check(clearance_margin_m >= 0, "clearance_margin_m >= 0");
-    f.check(standoff_margin_m >= 0, "standoff_margin_m >= 0");
-    f.check(max_distance_m > 0, "max_distance_m > 0");
+    f.check(clearance_margin_m >= 0 && clearance_margin_m <= 10, "0 <= clearance_margin_m <= 10");
+    f.check(standoff_margin_m >= 0 && standoff_margin_m <= 10, "0 <= standoff_margin_m <= 10");
+    f.check(max_distance_m > 0 && max_distance_m <= 50, "0 < max_distance_m <= 50");
   }
 };
 

@@ -65,12 +65,15 @@ struct LocalGridConfig {
     f.check(lidar_frames >= 1 && lidar_frames <= 10, "1 <= lidar_frames <= 10");
     f.check(confirm_frames >= 2 && confirm_frames <= 11, "2 <= confirm_frames <= 11");
     f.check(size_m.minCoeff() >= 1 && size_m.maxCoeff() <= 40, "1 <= size_m <= 40");
-    f.check(decay_per_s >= 0, "decay_per_s >= 0");
+    f.check(decay_per_s >= 0 && decay_per_s <= 1000, "0 <= decay_per_s <= 1000");
     f.check(lone_range_m >= 0 && lone_range_m <= 5, "0 <= lone_range_m <= 5");
     f.check(depth_min_m > 0 && depth_min_m < depth_max_m, "0 < depth_min_m < depth_max_m");
     f.check(depth_max_m <= 20, "depth_max_m <= 20");
-    f.check(depth_hit_stride_px >= 1, "depth_hit_stride_px >= 1");
-    f.check(depth_ray_stride_px % depth_hit_stride_px == 0,
+    f.check(depth_hit_stride_px >= 1 && depth_hit_stride_px <= 4096,
+            "1 <= depth_hit_stride_px <= 4096");
+    f.check(depth_ray_stride_px >= 1 && depth_ray_stride_px <= 4096,
+            "1 <= depth_ray_stride_px <= 4096");
+    f.check(depth_hit_stride_px < 1 || depth_ray_stride_px % depth_hit_stride_px == 0,
             "depth_ray_stride_px a multiple of depth_hit_stride_px");
   }
 };
@@ -108,13 +111,13 @@ struct GlobalMapConfig {
     f("ground_max_slope", ground_max_slope, "steeper rises are objects, not ground");
     f("ground_support", ground_support, "occupied voxels in two layers of a tile that make ground");
     f.check((low_m.array() < high_m.array()).all(), "low_m < high_m");
-    f.check((high_m - low_m).maxCoeff() <= 400, "high_m - low_m <= 400");
+    f.check((high_m - low_m).maxCoeff() <= 400, "high_m - low_m <= 400 m along each axis");
     f.check(margin_m >= 0 && margin_m <= 50, "0 <= margin_m <= 50");
     f.check(range_m > 0 && range_m <= 24, "0 < range_m <= 24");
     f.check(band_low_m < band_high_m, "band_low_m < band_high_m");
     f.check(min_free_cells >= 1 && min_free_cells <= 8, "1 <= min_free_cells <= 8");
     f.check(ground_max_slope > 0, "ground_max_slope > 0");
-    f.check(ground_support >= 1, "ground_support >= 1");
+    f.check(ground_support >= 1 && ground_support <= 64, "1 <= ground_support <= 64");
   }
 };
 

@@ -15,7 +15,7 @@ struct PointCloudMapConfig {
   void fields(auto& f) {
     f("voxel_m", voxel_m, "one point, the mean of what fell in, per such cell");
     f("max_points", max_points, "cells kept; later ones are left out (about 70 MB at the default)");
-    f.check(voxel_m > 0, "voxel_m > 0");
+    f.check(voxel_m >= 0.005 && voxel_m <= 10, "0.005 <= voxel_m <= 10");
     f.check(max_points > 0 && max_points <= 100000000, "0 < max_points <= 100000000");
   }
 };

@@ -34,8 +34,10 @@ struct ImuNoiseConfig {
     f("clipped_gyro_noise_density", clipped_gyro_noise_density,
       "rad/s/sqrt(Hz) while an axis reads its full scale");
     f.check(delay_s > -0.1 && delay_s < 0.1, "-0.1 < delay_s < 0.1");
-    f.check(gyro_noise_density > 0 && accel_noise_density > 0, "noise densities > 0");
-    f.check(gyro_walk_density >= 0 && accel_walk_density >= 0, "walk densities >= 0");
+    f.check(gyro_noise_density > 0 && accel_noise_density > 0,
+            "gyro_noise_density > 0, accel_noise_density > 0");
+    f.check(gyro_walk_density >= 0 && accel_walk_density >= 0,
+            "gyro_walk_density >= 0, accel_walk_density >= 0");
   }
 };
 
@@ -69,9 +71,9 @@ struct StaticInitialiserConfig {
     f("gravity_std_mps2", gravity_std_mps2,
       "1 sigma of the standard gravity's magnitude: what latitude and height leave open after "
       "scaling");
-    f.check(window_s > 0, "window_s > 0");
+    f.check(window_s >= 0.05 && window_s <= 60, "0.05 <= window_s <= 60");
     f.check(gyro_bias_std_radps > 0 && accel_bias_std_mps2 > 0 && gravity_std_mps2 > 0,
-            "initial deviations > 0");
+            "gyro_bias_std_radps, accel_bias_std_mps2, gravity_std_mps2 > 0");
   }
 };
 
@@ -98,7 +100,7 @@ struct LidarNoiseConfig {
     f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (reference.md, 2)");
     f("blind_m", blind_m, "nearer returns are dropped (reference.md, 5)");
     f("max_range_m", max_range_m, "further returns are dropped");
-    f.check(range_std_m > 0 && angle_std_rad > 0, "LiDAR noise > 0");
+    f.check(range_std_m > 0 && angle_std_rad > 0, "range_std_m > 0, angle_std_rad > 0");
     f.check(max_range_m > blind_m && blind_m >= 0, "max_range_m > blind_m >= 0");
   }
 };
@@ -123,11 +125,11 @@ struct SurfelMapConfig {
     f("max_thickness_ratio", max_thickness_ratio,
       "a surfel thicker (1 sigma) than this share of its edge is no surface");
     f("refresh_growth", refresh_growth, "a surfel is fitted anew when its points grew by this");
-    f.check(finest_edge_m > 0, "finest_edge_m > 0");
+    f.check(finest_edge_m >= 0.02 && finest_edge_m <= 10, "0.02 <= finest_edge_m <= 10");
     f.check(levels >= 1 && levels <= 4, "1 <= levels <= 4");
     f.check(capacity >= 1000 && capacity <= 4000000, "1000 <= capacity <= 4000000");
     f.check(min_points >= 4, "min_points >= 4");
-    f.check(refresh_growth >= 1, "refresh_growth >= 1");
+    f.check(refresh_growth >= 1 && refresh_growth <= 100, "1 <= refresh_growth <= 100");
   }
 };
 
@@ -152,9 +154,11 @@ struct RegistrationConfig {
     f("robust_sigma", robust_sigma, "scale of the Cauchy weight, in sigma");
     f("variance_inflation", variance_inflation,
       "on the residuals' variance: neighbours share their surfel's error");
-    f.check(scan_voxel_m > 0 && max_points > 0 && max_iterations > 0, "registration sizes > 0");
+    f.check(scan_voxel_m >= 0.005 && scan_voxel_m <= 10, "0.005 <= scan_voxel_m <= 10");
+    f.check(max_points >= 1 && max_points <= 1000000, "1 <= max_points <= 1000000");
+    f.check(max_iterations >= 1 && max_iterations <= 1000, "1 <= max_iterations <= 1000");
     f.check(gate_sigma > 0 && robust_sigma > 0 && variance_inflation > 0,
-            "registration weights > 0");
+            "gate_sigma, robust_sigma, variance_inflation > 0");
   }
 };
 
@@ -206,8 +210,14 @@ struct OdometryHealthConfig {
       "a found pose has this many times the matches of any that fits elsewhere");
     f("recovery_confirmations", recovery_confirmations,
       "good scans in a row before a found pose is called ok");
-    f.check(min_matches > 0 && lost_scans > 0, "health counts > 0");
-    f.check(recovery_step_m > 0 && recovery_yaw_steps > 0, "recovery steps > 0");
+    f.check(min_matches > 0 && lost_scans > 0, "min_matches > 0, lost_scans > 0");
+    f.check(recovery_points >= 1 && recovery_points <= 1000000, "1 <= recovery_points <= 1000000");
+    f.check(recovery_confirmations >= 0, "recovery_confirmations >= 0");
+    f.check(recovery_yaw_steps >= 1 && recovery_yaw_steps <= 3600,
+            "1 <= recovery_yaw_steps <= 3600");
+    f.check(recovery_radius_m >= 0 && recovery_radius_m <= 30 * recovery_step_m,
+            "0 <= recovery_radius_m <= 30 recovery_step_m");
+    f.check(recovery_step_m > 0, "recovery_step_m > 0");
   }
 };
 

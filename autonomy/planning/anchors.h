@@ -25,8 +25,13 @@ struct SearchConfig {
     f("detour_margin_cells", detour_margin_cells, "cells around a collision searched for a detour");
     f("detour_max_expansions", detour_max_expansions, "expansions of each detour search");
     f("max_expansions", max_expansions, "expansions in the whole grid, start to goal");
-    f.check(level_height_cells >= 0, "level_height_cells >= 0");
-    f.check(detour_margin_cells > 0, "detour_margin_cells > 0");
+    f.check(level_height_cells >= 0 && level_height_cells <= 2000,
+            "0 <= level_height_cells <= 2000");
+    f.check(level_max_expansions >= 1, "level_max_expansions >= 1");
+    f.check(detour_max_expansions >= 1, "detour_max_expansions >= 1");
+    f.check(max_expansions >= 1, "max_expansions >= 1");
+    f.check(detour_margin_cells >= 1 && detour_margin_cells <= 2000,
+            "1 <= detour_margin_cells <= 2000");
   }
 };
 

@@ -32,8 +32,9 @@ struct GuideConfig {
     f("comfort_weight", comfort_weight, "extra cost of a metre at the obstacle distance");
     f("unknown_weight", unknown_weight, "extra cost of a metre through unknown cells");
     f("max_expansions", max_expansions, "A* expansions");
-    f.check(margin_m >= 0, "margin_m >= 0");
-    f.check(comfort_distance_m >= 0, "comfort_distance_m >= 0");
+    f.check(margin_m >= 0 && margin_m <= 10, "0 <= margin_m <= 10");
+    f.check(max_expansions >= 1, "max_expansions >= 1");
+    f.check(comfort_distance_m >= 0 && comfort_distance_m <= 20, "0 <= comfort_distance_m <= 20");
     f.check(unknown_weight >= 0, "unknown_weight >= 0");
   }
 };

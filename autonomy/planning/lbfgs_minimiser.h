@@ -18,8 +18,8 @@ struct LbfgsConfig {
     f("memory", memory, "corrections that L-BFGS keeps (EGO-Planner)");
     f("max_iterations", max_iterations, "iterations of one minimisation (EGO-Planner)");
     f("gradient_tolerance", gradient_tolerance, "stop when |g| / max(1, |x|) is below");
-    f.check(memory > 0, "memory > 0");
-    f.check(max_iterations > 0, "max_iterations > 0");
+    f.check(memory >= 1 && memory <= 100, "1 <= memory <= 100");
+    f.check(max_iterations >= 1 && max_iterations <= 10000, "1 <= max_iterations <= 10000");
     f.check(gradient_tolerance > 0, "gradient_tolerance > 0");
   }
 };

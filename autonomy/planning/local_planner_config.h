@@ -95,16 +95,30 @@ struct LocalPlannerConfig {
     f("stop_in_known_space", stop_in_known_space, "slow down before unknown cells");
     f("unknown_speed_mps", unknown_speed_mps, "speed at which unknown cells may be entered");
     f("reaction_s", reaction_s, "between seeing and braking");
-    f.check(max_speed_mps > 0, "max_speed_mps > 0");
-    f.check(max_acceleration_mps2 > 0, "max_acceleration_mps2 > 0");
-    f.check(control_point_distance_m > 0, "control_point_distance_m > 0");
+    f.check(max_speed_mps >= 0.05 && max_speed_mps <= 50, "0.05 <= max_speed_mps <= 50");
+    f.check(max_acceleration_mps2 >= 0.05 && max_acceleration_mps2 <= 200,
+            "0.05 <= max_acceleration_mps2 <= 200");
+    f.check(control_point_distance_m >= 0.05 && control_point_distance_m <= 10,
+            "0.05 <= control_point_distance_m <= 10");
+    f.check(knot_span_ratio > 0, "knot_span_ratio > 0");
+    f.check(initial_speed_share > 0 && initial_speed_share <= 1, "0 < initial_speed_share <= 1");
     f.check(tight_share > 0 && tight_share <= 1, "0 < tight_share <= 1");
     f.check(safe_distance_m > 0, "safe_distance_m > 0");
     f.check(feasibility_threshold < feasibility_junction,
             "feasibility_threshold < feasibility_junction");
-    f.check(leave_distance_m >= 0, "leave_distance_m >= 0");
-    f.check(timing_knot_span_s > 0, "timing_knot_span_s > 0");
-    f.check(evasive_knot_span_s > 0, "evasive_knot_span_s > 0");
+    f.check(leave_distance_m >= 0 && leave_distance_m <= 10, "0 <= leave_distance_m <= 10");
+    f.check(max_rebounds >= 0 && max_rebounds <= 1000, "0 <= max_rebounds <= 1000");
+    f.check(random_starts >= 0 && random_starts <= 1000, "0 <= random_starts <= 1000");
+    f.check(timing_attempts >= 1 && timing_attempts <= 1000, "1 <= timing_attempts <= 1000");
+    f.check(timing_jerk_mps3 > 0, "timing_jerk_mps3 > 0");
+    f.check(true_radius_m > 0 && true_radius_m <= 2, "0 < true_radius_m <= 2");
+    f.check(max_goal_shift_m >= 0 && max_goal_shift_m <= 10, "0 <= max_goal_shift_m <= 10");
+    f.check(escape_distance_m >= 0 && escape_distance_m <= 10, "0 <= escape_distance_m <= 10");
+    f.check(escape_speed_mps > 0, "escape_speed_mps > 0");
+    f.check(timing_knot_span_s >= 0.002 && timing_knot_span_s <= 1,
+            "0.002 <= timing_knot_span_s <= 1");
+    f.check(evasive_knot_span_s >= 0.002 && evasive_knot_span_s <= 1,
+            "0.002 <= evasive_knot_span_s <= 1");
   }
 };
 

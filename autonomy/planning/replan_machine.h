@@ -70,11 +70,11 @@ struct ReplanConfig {
     f("back_off_speed_mps", back_off_speed_mps, "speed of that");
     f("track_spacing_m", track_spacing_m, "between kept points of the flown path");
     f("track_points", track_points, "kept points of the flown path");
-    f.check(check_rate_hz > 0, "check_rate_hz > 0");
-    f.check(horizon_m > 0, "horizon_m > 0");
+    f.check(check_rate_hz >= 1 && check_rate_hz <= 1000, "1 <= check_rate_hz <= 1000");
+    f.check(horizon_m > 0 && horizon_m <= 60, "0 < horizon_m <= 60");
     f.check(planning_latency_s >= 0, "planning_latency_s >= 0");
     f.check(tries_per_recovery > 0, "tries_per_recovery > 0");
-    f.check(track_points > 1, "track_points > 1");
+    f.check(track_points >= 2 && track_points <= 100000, "2 <= track_points <= 100000");
   }
 };
 

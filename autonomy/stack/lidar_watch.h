@@ -47,7 +47,9 @@ struct LidarWatchConfig {
     f.check(silent_after_s > 0 && memory_scans >= 1, "silent_after_s > 0, memory_scans >= 1");
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");
     f.check(false_scans >= 1 && sound_scans >= 1, "false_scans >= 1, sound_scans >= 1");
-    f.check(firing_period_s > 0 && lines >= 1, "firing_period_s > 0, lines >= 1");
+    f.check(firing_period_s >= 1e-7 && firing_period_s <= 1e-3, "1e-7 <= firing_period_s <= 1e-3");
+    f.check(lines >= 1 && lines <= 1000, "1 <= lines <= 1000");
+    f.check(least_points >= 1, "least_points >= 1");
   }
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <string_view>
 
@@ -35,11 +37,15 @@ struct OdometryConfig {
     f("latency_s", latency_s, "modelled compute time of a scan update");
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
     f("watch", watch, "when the LiDAR is called faulty");
-    f.check(latency_s >= 0, "latency_s >= 0");
+    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
   }
 };
 
 struct MappingConfig {
+  static constexpr double kMostLocalCells = 4e7;    ///< 15 bytes each, copied for every plan
+  static constexpr double kMostGlobalCells = 1e10;  ///< 160 MB before the first is seen
+  static constexpr double kOctomapReach = 32767;    ///< its keys have 16 bits an axis
+
   bool enabled = true;
   double resolution_m = 0.1;  ///< paper, IV-A
   double latency_s = 0.020;   ///< modelled compute time of one frame
@@ -60,11 +66,19 @@ struct MappingConfig {
     f("cloud", cloud, "global point cloud");
     local.fields(f);
     f("global", global, "OctoMap and 2D occupancy of the mission");
-    f.check(resolution_m > 0, "resolution_m > 0");
-    f.check(latency_s >= 0, "latency_s >= 0");
+    f.check(resolution_m >= 0.02 && resolution_m <= 1, "0.02 <= resolution_m <= 1");
+    const double cells_m3 = std::pow(resolution_m, 3);
+    f.check(local.size_m.prod() <= kMostLocalCells * cells_m3,
+            "size_m / resolution_m at most 4e7 cells in all");
+    f.check((global.high_m - global.low_m).prod() <= kMostGlobalCells * cells_m3,
+            "(global.high_m - global.low_m) / resolution_m at most 1e10 cells in all");
+    f.check(std::max(global.low_m.cwiseAbs().maxCoeff(), global.high_m.cwiseAbs().maxCoeff()) <=
+                kOctomapReach * resolution_m,
+            "global.low_m, global.high_m within 32767 resolution_m of the start (OctoMap)");
+    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
     f.check(depth_rate_hz > 0 && depth_rate_hz <= 30, "0 < depth_rate_hz <= 30");
-    f.check(map_2d_rate_hz > 0, "map_2d_rate_hz > 0");
-    f.check(cloud_range_m > 0, "cloud_range_m > 0");
+    f.check(map_2d_rate_hz > 0 && map_2d_rate_hz <= 1000, "0 < map_2d_rate_hz <= 1000");
+    f.check(cloud_range_m > 0 && cloud_range_m <= 1000, "0 < cloud_range_m <= 1000");
   }
 };
 
@@ -86,8 +100,8 @@ struct PlanningConfig {
     f("yaw", yaw, "heading along the path");
     f("guide", guide, "global guide path");
     f.check(inflation_m >= 0 && inflation_m <= 2, "0 <= inflation_m <= 2");
-    f.check(guide_rate_hz > 0, "guide_rate_hz > 0");
-    f.check(guide_latency_s >= 0, "guide_latency_s >= 0");
+    f.check(guide_rate_hz > 0 && guide_rate_hz <= 1000, "0 < guide_rate_hz <= 1000");
+    f.check(guide_latency_s >= 0 && guide_latency_s <= 60, "0 <= guide_latency_s <= 60");
   }
 };
 
@@ -100,8 +114,8 @@ struct ExplorationConfig {
     f("decision_rate_hz", decision_rate_hz, "how often the explorer looks at its target");
     f("latency_s", latency_s, "modelled compute time of a decision");
     explorer.fields(f);
-    f.check(decision_rate_hz > 0, "decision_rate_hz > 0");
-    f.check(latency_s >= 0, "latency_s >= 0");
+    f.check(decision_rate_hz > 0 && decision_rate_hz <= 1000, "0 < decision_rate_hz <= 1000");
+    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
   }
 };
 

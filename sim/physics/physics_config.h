@@ -89,7 +89,7 @@ struct BatteryConfig {
       "further charge over which an empty cell's voltage collapses");
     f("avionics_w", avionics_w, "power of computer and sensors");
     f("initial_state_of_charge", initial_state_of_charge, "state of charge at the start");
-    f.check(cells > 0, "cells > 0");
+    f.check(cells >= 1 && cells <= 100, "1 <= cells <= 100");
     f.check(capacity_ah > 0, "capacity_ah > 0");
     f.check(resistance_ohm >= 0, "resistance_ohm >= 0");
     f.check(cell_full_v > cell_middle_v, "cell_full_v > cell_middle_v");
@@ -148,8 +148,8 @@ struct ContactConfig {
     f("search_radius_m", search_radius_m, "collision shapes further away are left out");
     f.check(leg_bump_limit_mps >= 0, "leg_bump_limit_mps >= 0");
     f.check(hard_landing_limit_mps >= 0, "hard_landing_limit_mps >= 0");
-    f.check(slots >= 1, "slots >= 1");
-    f.check(search_radius_m >= 0.5, "search_radius_m >= 0.5");
+    f.check(slots >= 1 && slots <= 2000, "1 <= slots <= 2000");
+    f.check(search_radius_m >= 0.5 && search_radius_m <= 50, "0.5 <= search_radius_m <= 50");
   }
 };
 

@@ -24,7 +24,7 @@ struct MapErrorConfig {
     f.check(outlier_m > 0 && foliage_m >= 0, "outlier_m > 0, foliage_m >= 0");
     f.check(max_distance_m > outlier_m && max_distance_m > foliage_m,
             "max_distance_m > outlier_m, foliage_m");
-    f.check(max_points > 0, "max_points > 0");
+    f.check(max_points >= 1 && max_points <= 10000000, "1 <= max_points <= 10000000");
   }
 };
 

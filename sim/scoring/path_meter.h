@@ -16,10 +16,10 @@ struct PathMeterConfig {
     f("revisit_cell_m", revisit_cell_m, "side of the square cells that are visited");
     f("revisit_gap_m", revisit_gap_m, "path flown elsewhere before a return counts as a revisit");
     f("heading_step_m", heading_step_m, "chord over which the course is taken");
-    f.check(revisit_cell_m > 0, "revisit_cell_m > 0");
+    f.check(revisit_cell_m >= 0.05, "revisit_cell_m >= 0.05");
     f.check(revisit_gap_m >= 1.5 * revisit_cell_m,
             "revisit_gap_m >= 1.5 revisit_cell_m (a cell's diagonal)");
-    f.check(heading_step_m > 0, "heading_step_m > 0");
+    f.check(heading_step_m >= 0.01, "heading_step_m >= 0.01");
   }
 };
 

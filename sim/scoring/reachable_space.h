@@ -48,8 +48,9 @@ struct ReachableSpaceConfig {
     f("resolution_m", resolution_m, "cells of the true free space (the map's resolution)");
     f("start_search_m", start_search_m, "how far above the start the vehicle first has room");
     f("margin_m", margin_m, "surfaces this far outside the bounds still belong to them");
-    f.check(resolution_m > 0, "resolution_m > 0");
-    f.check(start_search_m >= 0 && margin_m >= 0, "start_search_m, margin_m >= 0");
+    f.check(resolution_m >= 0.05 && resolution_m <= 2, "0.05 <= resolution_m <= 2");
+    f.check(start_search_m >= 0 && start_search_m <= 100, "0 <= start_search_m <= 100");
+    f.check(margin_m >= 0 && margin_m <= 100, "0 <= margin_m <= 100");
   }
 };
 

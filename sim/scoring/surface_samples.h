@@ -21,7 +21,7 @@ struct SurfaceSampleConfig {
   void fields(auto& f) {
     f("sample_area_m2", sample_area_m2, "true surface for each sample");
     f("sample_height_m", sample_height_m, "surfaces higher than this above the ground don't count");
-    f.check(sample_area_m2 > 0, "sample_area_m2 > 0");
+    f.check(sample_area_m2 >= 0.002 && sample_area_m2 <= 10, "0.002 <= sample_area_m2 <= 10");
     f.check(sample_height_m > 0, "sample_height_m > 0");
   }
 };

@@ -19,9 +19,10 @@ struct VisibilityConfig {
     f("max_incidence_deg", max_incidence_deg,
       "nor flatter than this: half of the LiDAR's beams return (reference.md, section 2)");
     f("viewpoint_spacing_m", viewpoint_spacing_m, "one viewpoint in each cube of this side");
-    f.check(range_m > 0, "range_m > 0");
+    f.check(range_m > 0 && range_m <= 200, "0 < range_m <= 200");
     f.check(max_incidence_deg > 0 && max_incidence_deg <= 90, "0 < max_incidence_deg <= 90");
-    f.check(viewpoint_spacing_m > 0, "viewpoint_spacing_m > 0");
+    f.check(viewpoint_spacing_m >= 0.2 && viewpoint_spacing_m <= 100,
+            "0.2 <= viewpoint_spacing_m <= 100");
   }
 };
 

@@ -51,15 +51,17 @@ struct D430Config {
     f.check(rate_hz > 0 && rate_hz <= 1000, "0 < rate_hz <= 1000");
     f.check(width_px >= 8 && width_px <= 4096, "8 <= width_px <= 4096");
     f.check(height_px >= 8 && height_px <= 4096, "8 <= height_px <= 4096");
-    f.check(focal_px > 0, "focal_px > 0");
-    f.check(baseline_m > 0, "baseline_m > 0");
-    f.check(min_range_m > 0, "min_range_m > 0");
+    f.check(width_px * static_cast<double>(height_px) <= 4e6, "width_px height_px <= 4e6");
+    f.check(focal_px >= 1 && focal_px <= 1e5, "1 <= focal_px <= 1e5");
+    f.check(baseline_m > 0 && baseline_m <= 10, "0 < baseline_m <= 10");
+    f.check(min_range_m >= 0.01, "min_range_m >= 0.01");
     f.check(max_range_m > min_range_m, "max_range_m > min_range_m");
-    f.check(draw_range_m >= max_range_m, "draw_range_m >= max_range_m");
+    f.check(draw_range_m >= max_range_m && draw_range_m <= 2000,
+            "max_range_m <= draw_range_m <= 2000");
     f.check(disparity_sigma_px >= 0, "disparity_sigma_px >= 0");
     f.check(noise_kernel_px == 3 || noise_kernel_px == 5 || noise_kernel_px == 7,
             "noise_kernel_px is 3, 5 or 7");
-    f.check(disparity_step_px > 0, "disparity_step_px > 0");
+    f.check(disparity_step_px >= 1e-4, "disparity_step_px >= 1e-4");
     f.check(edge_step_px > 0, "edge_step_px > 0");
     f.check(edge_loss_min_px >= 0, "edge_loss_min_px >= 0");
     f.check(edge_loss_max_px >= edge_loss_min_px && edge_loss_max_px <= 16,

@@ -59,7 +59,8 @@ struct Mid360Config {
     f("fault_false_burst_from_s", fault_false_burst_from_s, "start of a burst of false returns");
     f("fault_false_burst_for_s", fault_false_burst_for_s, "length of that burst");
     f("fault_false_burst_fraction", fault_false_burst_fraction, "share of false returns in it");
-    f.check(rate_hz > 0 && period() > 0 && period() % kNanosecondsPerTick == 0,
+    f.check(rate_hz >= 1 && rate_hz <= 1000, "1 <= rate_hz <= 1000");
+    f.check(!(rate_hz > 0) || period() % kNanosecondsPerTick == 0,
             "1 / rate_hz a whole number of milliseconds");
     f.check(beam_half_angle_deg >= 0 && beam_half_angle_deg < 5, "0 <= beam_half_angle_deg < 5");
     f.check(echo_separation_m >= 0, "echo_separation_m >= 0");

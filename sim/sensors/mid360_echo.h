@@ -44,7 +44,7 @@ struct EchoConfig {
     f.check(range_noise_floor_m >= 0, "range_noise_floor_m >= 0");
     f.check(angle_noise_deg >= 0, "angle_noise_deg >= 0");
     f.check(blind_m > 0, "blind_m > 0");
-    f.check(max_range_m > blind_m, "max_range_m > blind_m");
+    f.check(max_range_m > blind_m && max_range_m <= 2000, "blind_m < max_range_m <= 2000");
     f.check(range_at_tenth_m > 0, "range_at_tenth_m > 0");
     f.check(range_reflectivity_exponent > 0, "range_reflectivity_exponent > 0");
     f.check(dropout_probability >= 0 && dropout_probability <= 1, "0 <= dropout_probability <= 1");

@@ -200,6 +200,83 @@ constexpr const char* kWalledIn =
     "seed: 3\nworld:\n  kind: forest\n  forest:\n    size_m: [30, 30]\n"
     "    start_radius_m: 0.8\n    tree_density_per_m2: 0.8\n    min_spacing_m: 0.8\n"
     "    clearings: [{centre_m: [8, 8], radius_m: 4}]\n";
+std::string refusal_of(const std::vector<std::string>& overrides) {
+  try {
+    load_scenario({}, overrides, {});
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+// Each of these once ended in bad_alloc, in SIGFPE, in a loop or in a mission of a millisecond.
+TEST(Scenario, SizesThatNoHostHasRoomForAreRefusedByTheirRule) {
+  const std::vector<std::pair<std::string, std::string>> absurd{
+      {"mapping.resolution_m=0.001", "0.02 <= resolution_m"},
+      {"mapping.resolution_m=0.021", "size_m / resolution_m"},
+      {"mapping.size_m=[1e5, 30, 3]", "1 <= size_m <= 40"},
+      {"mapping.global.high_m=[1e5, 25, 9]", "high_m - low_m <= 400"},
+      {"mapping.global={low_m: [-200, -200, -200], high_m: [200, 200, 200]}", "global.high_m"},
+      {"mapping.global={low_m: [5000, 0, 0], high_m: [5100, 9, 9]}", "OctoMap"},
+      {"mapping.depth_hit_stride_px=0", "1 <= depth_hit_stride_px"},
+      {"mapping.cloud.voxel_m=1e-9", "0.005 <= voxel_m"},
+      {"mapping.decay_per_s=1e300", "decay_per_s <= 1000"},
+      {"mapping.map_2d_rate_hz=1e8", "map_2d_rate_hz <= 1000"},
+      {"world.forest.size_m=[1e5, 1e5]", "10 <= size_m <= 500"},
+      {"world.forest={size_m: [500, 500], ground_spacing_m: 0.05}", "ground_spacing_m"},
+      {"world.forest={size_m: [400, 400], tree: {leaves: 20000}}", "1e7 triangles"},
+      {"world.forest.min_spacing_m=1e-9", "0.2 <= min_spacing_m"},
+      {"world.gaps={field_radius_min_m: 1e-9, field_radius_max_m: 1e-9, field_spacing_m: 1e-8}",
+       "0.2 <= field_spacing_m"},
+      {"depth.width_px=1000000", "width_px <= 4096"},
+      {"depth={width_px: 4096, height_px: 4096}", "width_px height_px <= 4e6"},
+      {"lidar.rate_hz=1e-9", "1 <= rate_hz"},
+      {"lidar.rate_hz=0", "1 <= rate_hz"},
+      {"scoring.coverage.space.resolution_m=1e-4", "0.05 <= resolution_m"},
+      {"scoring.coverage.surface.sample_area_m2=1e-12", "0.002 <= sample_area_m2"},
+      {"scoring.coverage.visibility.viewpoint_spacing_m=1e-5", "0.2 <= viewpoint_spacing_m"},
+      {"odometry.lidar_inertial.registration.max_points=2000000000", "max_points <= 1000000"},
+      {"odometry.lidar_inertial.health.recovery_step_m=1e-6", "30 recovery_step_m"},
+      {"odometry.watch.firing_period_s=1e-9", "1e-7 <= firing_period_s"},
+      {"exploration.detector.local_iterations=2000000000", "local_iterations <= 1000000"},
+      {"exploration.detector.cluster_bandwidth_m=1e-9", "0.02 <= cluster_bandwidth_m"},
+      {"exploration.space.information_radius_m=1e5", "information_radius_m <= 50"},
+      {"planning.local.control_point_distance_m=1e-9", "0.05 <= control_point_distance_m"},
+      {"planning.local.timing_knot_span_s=1e-8", "0.002 <= timing_knot_span_s"},
+      {"planning.replan.horizon_m=1e5", "horizon_m <= 60"},
+      {"physics.contact.slots=2000000000", "slots <= 2000"},
+      {"mission.yaw_burst_s=1e-10", "1e-09 s"},
+      {"mission.yaw_burst_s=1e-8", "yaw_burst_s >= 0.001"},
+      {"mission.max_time_s=1e10", "at most 1e+09 s"},
+      {"lidar.fault_silent_for_s=1e10", "at most 1e+09 s"},
+      {"odometry.latency_s=1e9", "latency_s <= 60"},
+  };
+  for (const auto& [assignment, rule] : absurd) {
+    const std::string message = refusal_of({assignment});
+    const std::string key = assignment.substr(0, assignment.find('='));
+    EXPECT_EQ(message.find("--set " + key + ": "), 0u) << assignment << ": " << message;
+    EXPECT_NE(message.find(rule), std::string::npos) << assignment << ": " << message;
+  }
+}
+
+TEST(Scenario, ALongFaultOrMissionIsLongNotOver) {
+  const Scenario scenario = load_scenario(
+      {}, {"mission.max_time_s=1e9", "lidar.fault_silent_from_s=1", "lidar.fault_silent_for_s=1e9"},
+      {});
+  EXPECT_EQ(from_seconds(scenario.config.stack.mission.max_time_s), 1'000'000'000 * 1'000'000'000L);
+  EXPECT_EQ(refusal_of({"mission.yaw_burst_s=0.001"}), "no error");
+}
+
+TEST(Scenario, TheExpectedSizeOfAForestIsThatOfTheForest) {
+  for (const char* name : {"forest", "forest_small"}) {
+    const Scenario scenario =
+        load_scenario(std::string(AREX_SOURCE_DIR "/scenarios/") + name + ".yaml", {}, {});
+    const auto triangles = static_cast<double>(scenario.build_world().mesh.triangles.size());
+    const double expected = scenario.config.world.forest.expected_triangles();
+    EXPECT_GT(expected, 0.7 * triangles) << name;
+    EXPECT_LT(expected, 2 * triangles) << name;
+  }
+}
 
 TEST(Scenario, ARecipeWithoutAFreeStartIsAnErrorAtItsLine) {
   const TemporaryFolder folder;

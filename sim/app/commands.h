@@ -69,7 +69,7 @@ int sweep(const SweepArguments& arguments);
 /// What a job of `sweep --slurm` does: one run of a batch.
 struct SweepTaskArguments {
   std::string batch;
-  std::size_t index = 0;
+  std::uint64_t index = 0;
 };
 int sweep_task(const SweepTaskArguments& arguments);
 

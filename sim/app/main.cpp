@@ -6,19 +6,23 @@
 #include <vector>
 
 #include "app/commands.h"
+#include "app/number_option.h"
 #include "config/config.h"
 
 namespace {
 
 using namespace arex::app;
 
+constexpr Range<std::uint64_t> kSeeds{};
+constexpr Range<double> kMoments{-1e9, 1e9};  // s, as in a scenario
+constexpr int kMostShots = 100'000'000;       // 500 s of the device
+
 void add_scenario_options(CLI::App& command, ScenarioArguments& arguments, bool file_required) {
   auto* file = command.add_option("scenario", arguments.file, "scenario file, scenarios/*.yaml");
   if (file_required) file->required();
   command.add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
-  command.add_option("--seed", arguments.seed, "the seed of everything random")
-      ->check(CLI::NonNegativeNumber);
+  add_number(command, "--seed", arguments.seed, kSeeds, "the seed of everything random");
 }
 
 void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
@@ -32,8 +36,8 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
                    "field>=value of the summary, else exit code 1; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
-  command->add_option("--threads", arguments.threads, "host threads; the result does not change")
-      ->check(CLI::Range(1, 64));
+  add_number(*command, "--threads", arguments.threads, Range<int>{1, 64},
+             "host threads; the result does not change");
   command->add_flag("!--no-report", arguments.report, "no report.html");
   command->add_flag("--quiet", arguments.quiet, "no progress line");
   command->callback([&] { exit_code = run(arguments); });
@@ -44,8 +48,7 @@ void add_world(CLI::App& app, WorldArguments& arguments, int& exit_code) {
   command->add_option("recipe", arguments.file, "world recipe, or a scenario")->required();
   command->add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
-  command->add_option("--seed", arguments.seed, "the seed of the world")
-      ->check(CLI::NonNegativeNumber);
+  add_number(*command, "--seed", arguments.seed, kSeeds, "the seed of the world");
   command->add_option("--out", arguments.out, "folder to write")->required();
   command->callback([&] { exit_code = world(arguments); });
 }
@@ -54,8 +57,8 @@ void add_pattern(CLI::App& app, PatternArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("pattern", "print the MID-360's firing directions as CSV");
   command->add_option("--mode", arguments.mode, "device or table")
       ->check(CLI::IsMember({"device", "table"}));
-  command->add_option("--shots", arguments.shots, "shots to print; a shot is four firings")
-      ->check(CLI::PositiveNumber);
+  add_number(*command, "--shots", arguments.shots, Range<int>{1, kMostShots},
+             "shots to print; a shot is four firings");
   command->callback([&] { exit_code = pattern(arguments); });
 }
 
@@ -67,16 +70,14 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
       ->add_option("--view", arguments.view,
                    "chase, top or both; default chase for a picture, both for a film")
       ->check(CLI::IsMember({"chase", "top", "both"}));
-  command->add_option("--time", arguments.time_s,
-                      "moment of a picture, s; default the flight's middle");
-  command->add_option("--from", arguments.from_s, "start of a film, s; default the flight's");
-  command->add_option("--to", arguments.to_s, "end of a film, s; default the flight's");
-  command->add_option("--fps", arguments.fps, "frames of a second of film")
-      ->check(CLI::Range(1, 120))
-      ->capture_default_str();
-  command->add_option("--speed", arguments.speed, "seconds of flight in a second of film")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  add_number(*command, "--time", arguments.time_s, kMoments,
+             "moment of a picture, s; default the flight's middle");
+  add_number(*command, "--from", arguments.from_s, kMoments,
+             "start of a film, s; default the flight's");
+  add_number(*command, "--to", arguments.to_s, kMoments, "end of a film, s; default the flight's");
+  add_number(*command, "--fps", arguments.fps, Range<int>{1, 120}, "frames of a second of film");
+  add_number(*command, "--speed", arguments.speed, Range<double>{1e-3, 1e6},
+             "seconds of flight in a second of film");
   command->callback([&] { exit_code = render(arguments); });
 }
 
@@ -84,8 +85,8 @@ void add_sweep(CLI::App& app, SweepArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("sweep", "fly many runs, each a process of its own");
   command->add_option("sweep", arguments.file, "sweep file, scenarios/sweeps/*.yaml")->required();
   command->add_option("--out", arguments.out, "folder; the same command there goes on")->required();
-  command->add_option("--jobs", arguments.jobs, "runs at a time; default one a core")
-      ->check(CLI::Range(1, 1024));
+  add_number(*command, "--jobs", arguments.jobs, Range<int>{1, 1024}, "runs at a time")
+      ->default_str("one a core");
   command->add_flag("--dry-run", arguments.dry_run, "list the runs, write nothing");
   command->add_flag("--status", arguments.status, "say how far it is, write nothing");
   command->add_flag("--slurm", arguments.slurm,
@@ -97,7 +98,8 @@ void add_sweep_task(CLI::App& app, SweepTaskArguments& arguments, int& exit_code
   auto* command = app.add_subcommand("sweep-task", "one run of a batch of 'sweep --slurm'");
   command->group("");  // for Slurm, not for people
   command->add_option("batch", arguments.batch, "file of the batch")->required();
-  command->add_option("index", arguments.index, "of the run in it")->required();
+  add_number(*command, "index", arguments.index, Range<std::uint64_t>{}, "of the run in it")
+      ->required();
   command->callback([&] { exit_code = sweep_task(arguments); });
 }
 

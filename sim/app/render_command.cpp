@@ -18,6 +18,7 @@ using View = FlightPictures::View;
 // Even, as video codecs want them; larger stills are for print.
 constexpr int kFilmWidth = 960;
 constexpr int kFilmHeight = 540;
+constexpr int kMostFrames = 1'000'000;  // three days of drawing
 
 View view_named(const std::string& name) {
   return name == "both" ? View::kBoth : name == "top" ? View::kTop : View::kChase;
@@ -55,7 +56,12 @@ void draw_film(const RenderArguments& arguments, const worlds::World& world, con
       ffmpeg.empty() ? film_as_frames(frames)
                      : film_by_ffmpeg(ffmpeg, file, options.width, options.height, arguments.fps);
   const double step = arguments.speed / arguments.fps;
-  const int count = 1 + static_cast<int>(std::floor((end - begin) / step));
+  const double steps = std::floor((end - begin) / step);
+  if (!(steps < kMostFrames)) {
+    throw ConfigError("--speed, --fps: make a film of " + config_detail::format_scalar(steps + 1) +
+                      " frames, expected at most " + std::to_string(kMostFrames));
+  }
+  const int count = 1 + static_cast<int>(steps);
   for (int i = 0; i < count; ++i) {
     const double time = begin + i * step;
     film->add(pictures.at(time, time));

@@ -1,3 +1,5 @@
+#include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "app/commands.h"
@@ -7,6 +9,8 @@
 
 namespace arex::app {
 namespace {
+
+constexpr double kMostCells = 5e8;  // of the ground-truth maps, 6 bytes each
 
 /// A world recipe on its own: the keys of a scenario's `world` section at the top of the file.
 struct RecipeConfig {
@@ -25,8 +29,18 @@ worlds::World build(const ConfigNode& root, const RecipeConfig& recipe) {
   try {
     return worlds::build_world(recipe.world, recipe.seed, sim::load_airframe().radius_m);
   } catch (const ConfigError& error) {
-    throw ConfigError(root.where + ": " + error.what());
+    throw ConfigError(given_last(root) + ": " + error.what());
   }
+}
+
+void check_size(const ConfigNode& root, const worlds::World& world, double resolution_m) {
+  const double cells = (world.bounds.high - world.bounds.low).prod() / std::pow(resolution_m, 3);
+  if (cells <= kMostCells) return;
+  std::array<char, 120> text{};
+  std::snprintf(text.data(), text.size(),
+                "export.resolution_m makes %.1e cells of this world, expected at most %.0e", cells,
+                kMostCells);
+  config_detail::fail(config_detail::locate_rule(root, text.data()), text.data());
 }
 
 }  // namespace
@@ -41,10 +55,11 @@ int world(const WorldArguments& arguments) {
     recipe.world = scenario.config.world;
     recipe.seed = scenario.config.seed;
   } else {
-    if (arguments.seed) apply_override(root, "seed=" + std::to_string(*arguments.seed));
+    if (arguments.seed) sim::set_seed(root, *arguments.seed, "--seed");
     read_config(root, recipe);
   }
   const worlds::World built = build(root, recipe);
+  check_size(root, built, recipe.exported.resolution_m);
   worlds::export_world(built, recipe.exported, arguments.out);
   std::printf("%s: %zu objects, %zu triangles, %zu collision shapes\n", arguments.out.c_str(),
               built.objects.size(), built.mesh.triangles.size(), built.collision_shapes.size());

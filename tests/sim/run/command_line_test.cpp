@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "support/process.h"
@@ -70,6 +73,143 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   EXPECT_EQ(missing.err, "/does/not/exist.yaml:1: cannot be read, expected a YAML file\n");
   EXPECT_EQ(run({"fly"}).exit_code, 2);
   EXPECT_EQ(run({}).exit_code, 2);
+}
+
+// Exit code 2 and one printable line that names the option, within a second.
+void expect_option_refused(const std::vector<std::string>& arguments, const std::string& expected) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Result result = run(arguments);
+  const auto took = std::chrono::steady_clock::now() - begin;
+  EXPECT_EQ(result.exit_code, 2) << expected;
+  EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_LT(result.err.size(), 300u) << result.err;
+  EXPECT_LT(took, std::chrono::seconds(1)) << expected;
+  for (const char c : result.err) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20);
+}
+
+TEST(CommandLine, NumbersOfOptionsAreReadAsThoseOfFiles) {
+  const std::string bad(310, '7');
+  for (const std::string& seed : {std::string("abc"), std::string("-1"), std::string("0x10"),
+                                  std::string("1e3"), std::string("18446744073709551616"), bad}) {
+    for (const char* command : {"run", "params", "validate"}) {
+      expect_option_refused({command, kWaypoints, "--seed", seed}, "--seed: is '");
+    }
+    expect_option_refused({"world", kWaypoints, "--out", "/does/not/exist", "--seed", seed},
+                          "--seed: is '");
+  }
+  const std::string folder = "/does/not/exist";
+  for (const char* number : {"nan", "inf", "-inf", "1e400", "1e10", "x"}) {
+    for (const char* option : {"--from", "--to", "--time", "--speed"}) {
+      expect_option_refused({"render", folder, "--out", "x.mp4", option, number},
+                            std::string(option) + ": is '" + number + "'");
+    }
+  }
+  expect_option_refused({"render", folder, "--out", "x.mp4", "--speed", "0"}, "--speed: is '0'");
+  expect_option_refused({"render", folder, "--out", "x.mp4", "--fps", "1e2"}, "--fps: is '1e2'");
+  expect_option_refused({"run", kWaypoints, "--threads", "4294967297"}, "--threads: is '");
+  expect_option_refused({"pattern", "--shots", "2147483647"}, "--shots: is '2147483647'");
+  expect_option_refused({"sweep", "s.yaml", "--out", folder, "--jobs", "010x"}, "--jobs: is '");
+  // 010 is ten wherever it stands.
+  for (const char* seed : {"010", "18446744073709551615"}) {
+    const Result params = run({"params", kWaypoints, "--seed", seed});
+    EXPECT_EQ(params.exit_code, 0) << params.err;
+    EXPECT_EQ(run({"params", kWaypoints, "--set", std::string("seed=") + seed}).out, params.out);
+  }
+  EXPECT_NE(run({"params", kWaypoints, "--seed", "010"}).out.find("  10  "), std::string::npos);
+}
+
+// The value of a parameter as `arex params` lists it: `key  value  unit  meaning`.
+std::map<std::string, std::string> listed(const std::string& params) {
+  std::map<std::string, std::string> values;
+  std::istringstream lines(params);
+  for (std::string line; std::getline(lines, line);) {
+    const auto key_end = line.find(' ');
+    const auto begin = line.find_first_not_of(' ', key_end);
+    values[line.substr(0, key_end)] = line.substr(begin, line.find("  ", begin) - begin);
+  }
+  return values;
+}
+
+TEST(CommandLine, RunSweepAndParamsMeanTheSameScenario) {
+  const TemporaryFolder folder;
+  write_text(folder / "base.yaml",
+             "seed: 18446744073709551615\nworld: {kind: empty, empty: {size_m: [20, 20]}}\n"
+             "mapping: {enabled: false, use_depth: false}\nodometry: {source: mocap}\n"
+             "mission: {kind: waypoints, waypoints_m: [[1, 0, 1]], max_time_s: 0.2}\n");
+  const std::string base = (folder / "base.yaml").string();
+  int number = 0;
+  for (const std::string& setting :
+       {std::string("mission.hold_s=1"), std::string("physics.battery.capacity_ah=0.2"),
+        std::string("physics.battery.cells=6"), std::string("exploration.consumption.full_v=25")}) {
+    const std::filesystem::path out = folder / std::to_string(++number);
+    const auto equals = setting.find('=');
+    write_text(folder / "sweep.yaml", "base: base.yaml\nset: {" + setting.substr(0, equals) + ": " +
+                                          setting.substr(equals + 1) + "}\n");
+    EXPECT_EQ(run({"validate", base, "--set", setting}).exit_code, 0);
+    EXPECT_EQ(run({"run", base, "--set", setting, "--quiet", "--no-report", "--out",
+                   (out / "run").string()})
+                  .exit_code,
+              1);  // timed out
+    const Result sweep =
+        run({"sweep", (folder / "sweep.yaml").string(), "--out", (out / "sweep").string()});
+    EXPECT_EQ(sweep.exit_code, 0) << sweep.err;
+    const std::string resolved = read_text(out / "run/resolved.yaml");
+    ASSERT_FALSE(resolved.empty());
+    for (const auto& flown : std::filesystem::directory_iterator(out / "sweep/runs")) {
+      EXPECT_EQ(read_text(flown.path() / "resolved.yaml"), resolved) << setting;
+      const auto alone = nlohmann::json::parse(read_text(out / "run/summary.json"));
+      const auto swept = nlohmann::json::parse(read_text(flown.path() / "summary.json"));
+      EXPECT_EQ(swept["trajectory_hash"], alone["trajectory_hash"]) << setting;
+    }
+    EXPECT_EQ(run({"params", (out / "run/resolved.yaml").string()}).out,
+              run({"params", base, "--set", setting}).out);
+    const auto values = listed(run({"params", base, "--set", setting}).out);
+    EXPECT_EQ(values.at("seed"), "18446744073709551615");
+    for (const auto& [key, value] : values) {
+      const std::string leaf = key.substr(key.rfind('.') + 1);
+      EXPECT_NE(resolved.find(leaf + ": " + value + "\n"), std::string::npos) << key;
+    }
+  }
+}
+
+TEST(CommandLine, RefusesHostileFilesWithinASecond) {
+  std::string bomb = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n";
+  for (char name = 'b'; name < 'l'; ++name) {
+    const std::string before = std::string("*") + static_cast<char>(name - 1);
+    bomb += std::string(1, name) + ": &" + name + " [";
+    for (int i = 0; i < 9; ++i) bomb += (i ? ", " : "") + before;
+    bomb += "]\n";
+  }
+  const std::vector<std::pair<std::string, std::string>> files{
+      {"a: &a [*a]\n", ":1: an alias"},
+      {bomb, " values, aliases followed"},
+      {"seed: 1\n---\nseed: 2\n", ":2: a second document"},
+      {"x: &x {seed: 1}\nmission:\n  <<: *x\n", ":3: a merge key '<<'"},
+      {"seed: !!int 1\n", ":1: has the tag"},
+      {"seed: \"\\e[31m\"\n", ":1: 'seed' is '\\x1b[31m'"},
+      {"\x1b[31m: 1\n", ":1: control character \\x1b"},
+      {"seed: \xff\n", ":1: no UTF-8"},
+      {"", ":1: the file is empty"},
+      {"seed: " + std::string(100'000, '[') + "\n", ":1: "},
+      {"# " + std::string(3 << 20, 'x'), ":1: longer than"},
+      {"mapping: {resolution_m: 0.001}\n", ":1: out of range: expected 0.02 <= resolution_m"},
+  };
+  const TemporaryFolder folder;
+  const std::string file = (folder / "bad.yaml").string();
+  for (const auto& [text, expected] : files) {
+    write_text(folder / "bad.yaml", text);
+    for (const char* command : {"run", "params", "validate"}) {
+      expect_option_refused({command, file}, file + expected);
+    }
+    expect_option_refused({"sweep", file, "--out", (folder / "out").string()}, file + ":");
+    expect_option_refused({"world", file, "--out", (folder / "out").string()}, file + ":");
+    write_text(folder / "sweep.yaml", "base: bad.yaml\n");
+    expect_option_refused(
+        {"sweep", (folder / "sweep.yaml").string(), "--out", (folder / "out").string()},
+        file + expected);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
 TEST(CommandLine, ListsParametersAndValidatesScenarios) {

@@ -138,7 +138,8 @@ ordered_json comparison_payload(const ResultTable& results,
     ordered_json row = ordered_json::array();
     for (const std::size_t column : columns) {
       const std::string& cell = table.rows[i][column];
-      const auto number = parse_number(cell);
+      // A seed is a name: JavaScript's numbers would round the large ones.
+      const auto number = table.columns[column] == "seed" ? std::nullopt : parse_number(cell);
       if (number) {
         row.push_back(*number);
       } else if (cell.empty()) {

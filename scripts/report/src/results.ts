@@ -23,7 +23,8 @@ export function betterSign(figure: string): number {
   return MORE_IS_BETTER.includes(figure) ? 1 : LESS_IS_BETTER.includes(figure) ? -1 : 0;
 }
 
-function compare(a: Cell, b: Cell): number {
+/** Numbers by value, and so what is text but all digits, as seeds are. */
+export function compare(a: Cell, b: Cell): number {
   if (typeof a === 'number' && typeof b === 'number') return a - b;
   return String(a).localeCompare(String(b), 'en', { numeric: true });
 }

@@ -3,7 +3,7 @@
 import { addChart, clearCharts } from './charts';
 import { byId, element, onThemeChange, shown, themeColour } from './dom';
 import { Cell, SweepPayload } from './payload';
-import { Results, SUCCESS, betterSign, shortKey } from './results';
+import { Results, SUCCESS, betterSign, compare, shortKey } from './results';
 import { Estimate, estimateMean } from './statistics';
 
 const LINE_COLOURS = 6; // --line-1 ... of the style sheet
@@ -247,8 +247,7 @@ class RunTable {
     return rows.sort((a, b) => {
       const [x, y] = [value(a), value(b)];
       if (x === null || y === null) return Number(x === null) - Number(y === null); // the empty ones last
-      const order = typeof x === 'number' && typeof y === 'number' ? x - y : String(x).localeCompare(String(y));
-      return this.direction * order;
+      return this.direction * compare(x, y);
     });
   }
 

@@ -45,6 +45,19 @@ TEST(ComparisonReport, NamesFailuresByTheirCause) {
   EXPECT_TRUE(contains(html, "<td class=\"text\">hit trunk 4 at 1.20 m/s</td>"));
 }
 
+TEST(ComparisonReport, SeedsStayTheDigitsThatTheyAre) {
+  const TemporaryFolder folder;
+  write_text(folder / "sweep.csv",
+             "run,scenario,seed,failure,detail,outcome,distance_m\n"
+             "0,one,18446744073709551615,,,succeeded,3.5\n"
+             "1,one,9007199254740993,,,succeeded,4.5\n");
+  const auto payload = comparison_payload(read_results({folder.path()}), folder.path());
+  const std::vector<std::string> columns = payload["columns"];
+  const auto column = std::find(columns.begin(), columns.end(), "seed") - columns.begin();
+  EXPECT_EQ(payload["rows"][0][static_cast<std::size_t>(column)], "18446744073709551615");
+  EXPECT_EQ(payload["rows"][1][static_cast<std::size_t>(column)], "9007199254740993");
+}
+
 TEST(ComparisonReport, LinksToTheRunsThatAreThere) {
   const TemporaryFolder folder;
   test::write_synthetic_sweep(folder.path());

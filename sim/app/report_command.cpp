@@ -8,6 +8,7 @@
 #include "report/comparison_report.h"
 #include "report/page.h"
 #include "report/run_report.h"
+#include "run/foreign_json.h"
 
 namespace arex::app {
 namespace {
@@ -35,9 +36,9 @@ void report_comparison(const std::vector<fs::path>& folders, const fs::path& dir
 // By what sweep.json calls it, otherwise by its folder.
 std::string sweep_title(const fs::path& folder) {
   const auto bytes = sim::read_bytes(folder / "sweep.json");
-  const auto json = nlohmann::json::parse(bytes.value_or(""), nullptr, false);
-  if (!json.is_object()) return "Sweep " + folder.filename().string();
-  return "Sweep " + json.value("name", folder.filename().string());
+  const auto json = sim::parse_object(bytes.value_or(""));
+  const std::string otherwise = folder.filename().string();
+  return "Sweep " + (json.is_object() ? sim::text_field(json, "name", otherwise) : otherwise);
 }
 
 // The deepest folder that holds all of them.

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "app/commands.h"
+#include "run/foreign_json.h"
 #include "sweep/file_io.h"
 #include "sweep/slurm.h"
 #include "sweep/supervisor.h"
@@ -157,9 +158,8 @@ void write_tables(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
 }
 
 void warn_of_another_build(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
-  const auto before =
-      nlohmann::json::parse(sim::read_file(folder.root() / "sweep.json"), nullptr, false);
-  if (!before.is_object() || before.value("build", plan.build) == plan.build) return;
+  const auto before = sim::parse_object(sim::read_file(folder.root() / "sweep.json"));
+  if (!before.is_object() || sim::text_field(before, "build", plan.build) == plan.build) return;
   std::fprintf(stderr, "%s: holds runs of another build, which do not count for this one\n",
                folder.root().c_str());
 }

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "config/config.h"
+#include "run/foreign_json.h"
 
 namespace arex::sim {
 namespace {
@@ -157,7 +158,7 @@ bool is_run_folder(const std::filesystem::path& folder) {
 std::optional<nlohmann::ordered_json> read_summary(const std::filesystem::path& folder) {
   const auto bytes = read_bytes(folder / "summary.json");
   if (!bytes) return std::nullopt;
-  auto json = nlohmann::ordered_json::parse(*bytes, nullptr, false);
+  auto json = parse_object(*bytes);
   if (!json.is_object()) return std::nullopt;
   return json;
 }

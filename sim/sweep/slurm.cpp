@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "run/foreign_json.h"
 #include "run/trajectory_hash.h"
 #include "sweep/child_process.h"
 #include "sweep/file_io.h"
@@ -111,8 +112,9 @@ void write_batch(const SweepFolder& folder, const std::string& name, const Sweep
 std::vector<std::string> sbatch_arguments(const SweepFolder& folder, const SweepPlan& plan,
                                           const std::string& name, std::size_t runs, int at_a_time,
                                           const std::vector<std::string>& options) {
-  const int minutes =
-      kTimeMargin_min + static_cast<int>(std::ceil(plan.timeout_s * (plan.retries + 1) / 60));
+  // A plan's timeout is at most 1e9 s, its retries are at most a hundred.
+  const auto minutes = kTimeMargin_min + static_cast<std::int64_t>(
+                                             std::ceil(plan.timeout_s * (plan.retries + 1) / 60));
   std::string array = "--array=0-" + std::to_string(runs - 1);
   if (at_a_time > 0) array += "%" + std::to_string(at_a_time);
   std::vector<std::string> arguments{"--parsable",
@@ -141,15 +143,23 @@ std::string job_id_of(const std::string& answer) {
 }  // namespace
 
 BatchFile load_batch(const fs::path& file) {
-  const ordered_json json = ordered_json::parse(read_file(file), nullptr, false);
-  if (!json.is_object() || !json.contains("runs")) {
+  const ordered_json json = parse_object(read_file(file));
+  const auto number = [&](const char* key) { return json.contains(key) && json[key].is_number(); };
+  bool whole = json.is_object() && number("timeout_s") && number("retries") &&
+               json.contains("runs") && json["runs"].is_array();
+  BatchFile batch;
+  if (whole) {
+    batch.timeout_s = std::clamp(json["timeout_s"].get<double>(), 0.0, 1e9);
+    batch.retries = static_cast<int>(std::clamp(json["retries"].get<double>(), 0.0, 100.0));
+    for (const auto& run : json["runs"]) {
+      whole &= run.is_object() && !text_field(run, "id").empty();
+      if (whole) batch.runs.push_back({text_field(run, "id"), text_field(run, "scenario")});
+    }
+  }
+  if (!whole) {
     throw ConfigError(file.string() +
                       ":1: is not a batch, expected one that 'arex sweep --slurm' " +
                       "has written");
-  }
-  BatchFile batch{json.value("timeout_s", 0.0), json.value("retries", 0), {}};
-  for (const auto& run : json["runs"]) {
-    batch.runs.push_back({run.value("id", ""), run.value("scenario", "")});
   }
   return batch;
 }

@@ -8,6 +8,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "run/foreign_json.h"
 #include "sweep/file_io.h"
 
 namespace arex::sim {
@@ -18,10 +19,7 @@ using nlohmann::ordered_json;
 
 constexpr std::string_view kPartial = ".partial-";
 
-ordered_json parse_or_null(const fs::path& file) {
-  const ordered_json json = ordered_json::parse(read_file(file), nullptr, false);
-  return json.is_object() ? json : ordered_json(nullptr);
-}
+ordered_json parse_or_null(const fs::path& file) { return parse_object(read_file(file)); }
 
 bool valid(const ordered_json& summary) {
   if (!summary.is_object() || !summary.contains("outcome") || !summary.contains("build")) {
@@ -85,8 +83,8 @@ RunState SweepFolder::state(const std::string& id) const {
   if (summary(id)) return {Failure::kNone, ""};
   const ordered_json record = parse_or_null(root_ / failed(id) / "failure.json");
   if (!record.is_object()) return {};
-  RunState state{Failure::kUnfinished, record.value("detail", "")};
-  const std::string name = record.value("failure", "");
+  RunState state{Failure::kUnfinished, text_field(record, "detail")};
+  const std::string name = text_field(record, "failure");
   const auto at = std::find(kFailureNames.begin(), kFailureNames.end(), name);
   if (at != kFailureNames.end()) state.failure = static_cast<Failure>(at - kFailureNames.begin());
   return state;

@@ -1,0 +1,139 @@
+#include "fuzz/targets.h"
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "config/config.h"
+#include "fuzz/corpus.h"
+#include "fuzz/mutation.h"
+#include "report/comparison_report.h"
+#include "report/page.h"
+#include "report/result_table.h"
+#include "report/run_record.h"
+#include "report/run_report.h"
+#include "run/requirement.h"
+#include "run/scenario.h"
+#include "support/temporary_folder.h"
+#include "sweep/slurm.h"
+#include "sweep/sweep_folder.h"
+#include "sweep/sweep_plan.h"
+
+namespace arex::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMostRuns = 200;  // more are expanded as these are, and take their time
+
+// What resolves once must resolve to itself: otherwise a run cannot be flown again.
+void expect_the_same_again(const sim::Scenario& scenario) {
+  const std::string resolved = scenario.resolved_yaml();
+  const sim::Scenario again = sim::make_scenario("again", parse_yaml(resolved, "resolved.yaml"));
+  if (again.resolved_yaml() != resolved) throw std::runtime_error("resolved.yaml resolves anew");
+}
+
+void read_scenario(const fs::path& folder, RandomStream& random) {
+  static const std::vector<std::string> others = texts_of(shipped_scenarios());
+  const std::string text = shipped_scenarios().at(any_name(shipped_scenarios(), random));
+  write_text(folder / "case.yaml", damage_yaml(text, others, random));
+  expect_the_same_again(sim::load_scenario(folder / "case.yaml", {}, {}));
+}
+
+// Every parameter, with values that somebody may give it.
+void read_overrides(const fs::path& folder, RandomStream& random) {
+  static const auto parameters = list_parameters(sim::ScenarioConfig{});
+  std::vector<std::string> overrides;
+  std::string all;
+  const int count = random.uniform_int(1, 3);
+  for (int i = 0; i < count; ++i) {
+    const int at = random.uniform_int(0, static_cast<int>(parameters.size()) - 1);
+    overrides.push_back(parameters[static_cast<std::size_t>(at)].key + "=" + hostile_value(random));
+    if (random.uniform_int(0, 9) == 0)
+      overrides.back() = damage_bytes(overrides.back(), {}, random);
+    all += overrides.back() + "\n";
+  }
+  write_text(folder / "overrides.txt", all);
+  const auto seed = random.uniform_int(0, 1) == 0 ? std::optional(random.bits()) : std::nullopt;
+  expect_the_same_again(sim::load_scenario({}, overrides, seed));
+}
+
+void read_sweep(const fs::path& folder, RandomStream& random) {
+  write_files(shipped_folder(), folder);
+  const std::string name = any_name(shipped_sweeps(), random);
+  const fs::path file = folder / "sweeps" / name;
+  write_text(file, damage_yaml(shipped_sweeps().at(name), texts_of(shipped_sweeps()), random));
+  const sim::SweepFile sweep = sim::load_sweep_file(file);
+  if (sim::count_runs(sweep) <= kMostRuns) sim::expand(sweep, "build");
+}
+
+void report_run(const fs::path& folder, RandomStream& random) {
+  write_files(recorded_run(), folder);
+  damage_files(recorded_run(), folder, random);
+  sim::run_report_html(sim::read_run(folder, 1000));
+}
+
+// What the command `render` reads, but for the drawing.
+void read_flight(const fs::path& folder, RandomStream& random) {
+  write_files(recorded_run(), folder);
+  damage_files(recorded_run(), folder, random);
+  sim::read_tum(folder / "truth.tum");
+  sim::load_scenario(folder / "resolved.yaml", {}, {});
+}
+
+void report_sweep(const fs::path& folder, RandomStream& random) {
+  write_files(recorded_sweep(), folder);
+  damage_files(recorded_sweep(), folder, random);
+  const sim::ResultTable results = sim::read_results({folder});
+  sim::comparison_report_html(results, "case", folder);
+}
+
+void read_requirement(const fs::path& folder, RandomStream& random) {
+  const std::string text =
+      damage_bytes("coverage.area_fraction>=0.95", {"outcome==succeeded"}, random);
+  write_text(folder / "requirement.txt", text);
+  sim::parse_requirement(text);
+}
+
+void read_batch(const fs::path& folder, RandomStream& random) {
+  write_text(
+      folder / "batch.json",
+      damage_bytes(R"({"timeout_s": 60.0, "retries": 1, "runs": [{"id": "0", "scenario": "x"}]})",
+                   {"[[[[[[", "{\"runs\": 3}", "\"id\": 7,"}, random));
+  sim::load_batch(folder / "batch.json");
+}
+
+// What a sweep finds in a folder that others have written.
+void read_sweep_folder(const fs::path& folder, RandomStream& random) {
+  const std::string summary = R"({"outcome": "succeeded", "reason": "landed", "seed": 1})";
+  const std::string failure = R"({"failure": "crashed", "detail": "signal 11"})";
+  fs::create_directories(folder / "runs/1");
+  fs::create_directories(folder / "runs/2.failed");
+  write_text(folder / "runs/1/summary.json", damage_bytes(summary, {failure, "[[[["}, random));
+  write_text(folder / "runs/1/host.json", damage_bytes(summary, {failure, "[[[["}, random));
+  write_text(folder / "runs/2.failed/failure.json", damage_bytes(failure, {summary, "7"}, random));
+  const sim::SweepFolder sweep(folder);
+  if (const auto found = sweep.summary("1")) {
+    if (!found->at("outcome").is_string()) throw std::runtime_error("an outcome that is no text");
+  }
+  sweep.host("1");
+  sweep.state("2");
+}
+
+}  // namespace
+
+std::vector<Target> all_targets() {
+  return {{"scenario", read_scenario},
+          {"overrides", read_overrides},
+          {"sweep", read_sweep},
+          {"run report", report_run},
+          {"overrides, too", read_overrides},
+          {"flight", read_flight},
+          {"sweep report", report_sweep},
+          {"requirement", read_requirement},
+          {"batch", read_batch},
+          {"sweep folder", read_sweep_folder},
+          {"scenario, too", read_scenario}};
+}
+
+}  // namespace arex::test

@@ -131,6 +131,79 @@ std::vector<std::string> split_key(const std::string& dotted_key) {
   return keys;
 }
 
+// The unit that a name's last word stands for; empty: none.
+std::string_view unit_of_word(std::string_view word) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 42> kUnits{{
+      {"mps3", "m/s^3"},
+      {"mps2", "m/s^2"},
+      {"mps", "m/s"},
+      {"radps3", "rad/s^3"},
+      {"radps2", "rad/s^2"},
+      {"radps", "rad/s"},
+      {"radpm", "rad/m"},
+      {"degps", "deg/s"},
+      {"dps", "deg/s"},
+      {"rad", "rad"},
+      {"deg", "deg"},
+      {"mm", "mm"},
+      {"m3", "m^3"},
+      {"m2", "m^2"},
+      {"m", "m"},
+      {"us", "us"},
+      {"ms", "ms"},
+      {"ns", "ns"},
+      {"s", "s"},
+      {"hz", "Hz"},
+      {"px", "px"},
+      {"mb", "MB"},
+      {"kg", "kg"},
+      {"kgm2", "kg m^2"},
+      {"kgpm3", "kg/m^3"},
+      {"nm", "N m"},
+      {"n", "N"},
+      {"wh", "Wh"},
+      {"ah", "Ah"},
+      {"w", "W"},
+      {"v", "V"},
+      {"a", "A"},
+      {"ohm", "ohm"},
+      {"pa", "Pa"},
+      {"gauss", "G"},
+      {"percent", "%"},
+      {"fraction", "1"},
+      {"ratio", "1"},
+      {"share", "1"},
+      {"probability", "1"},
+      {"charge", "1"},
+      {"reflectivity", "1"},
+  }};
+  const auto found =
+      std::find_if(kUnits.begin(), kUnits.end(), [&](const auto& u) { return u.first == word; });
+  return found == kUnits.end() ? std::string_view() : found->second;
+}
+
+// The unit of what a noise is a noise of: 'gyro' in clipped_gyro_noise_density.
+std::string quantity_unit(const std::vector<std::string_view>& words) {
+  const auto has = [&](std::string_view word) {
+    return std::find(words.begin(), words.end(), word) != words.end();
+  };
+  if (has("scale")) return "1";
+  if (has("gyro")) return "rad/s";
+  if (has("accel")) return "m/s^2";
+  if (has("magnetometer")) return "G";
+  return has("range") ? "m" : "";
+}
+
+// Of 'x_noise_density', white noise per root of bandwidth, and 'x_walk_density', the same of the
+// derivative. What else is called a density has no unit that its name would tell.
+std::string density_unit(const std::vector<std::string_view>& words) {
+  const std::string_view kind = words[words.size() - 2];
+  const std::string unit = quantity_unit(words);
+  if (unit.empty() || (kind != "noise" && kind != "walk")) return "";
+  if (kind == "noise") return unit + "/sqrt(Hz)";
+  return (unit == "m/s^2" ? "m/s^3" : unit == "rad/s" ? "rad/s^2" : unit + "/s") + "/sqrt(Hz)";
+}
+
 }  // namespace
 
 const ConfigNode* ConfigNode::find(std::string_view key) const {
@@ -365,20 +438,19 @@ std::string format_scalar(const std::string& value) {
 }
 
 std::string unit_of(std::string_view name) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 31> kUnits{{
-      {"_mps3", "m/s^3"},  {"_mps2", "m/s^2"},  {"_mps", "m/s"},    {"_radps2", "rad/s^2"},
-      {"_radps", "rad/s"}, {"_degps", "deg/s"}, {"_rad", "rad"},    {"_deg", "deg"},
-      {"_mm", "mm"},       {"_m3", "m^3"},      {"_m2", "m^2"},     {"_per_m", "1/m"},
-      {"_m", "m"},         {"_ms", "ms"},       {"_ns", "ns"},      {"_s", "s"},
-      {"_hz", "Hz"},       {"_px", "px"},       {"_kg", "kg"},      {"_nm", "N m"},
-      {"_n", "N"},         {"_wh", "Wh"},       {"_ah", "Ah"},      {"_w", "W"},
-      {"_v", "V"},         {"_a", "A"},         {"_ohm", "ohm"},    {"_pa", "Pa"},
-      {"_gauss", "G"},     {"_kgm2", "kg m^2"}, {"_fraction", "1"},
-  }};
-  for (const auto& [suffix, unit] : kUnits) {
-    if (name.ends_with(suffix)) return std::string(unit);
+  std::vector<std::string_view> words;
+  for (std::string_view rest = name; !rest.empty();) {
+    words.push_back(rest.substr(0, rest.find('_')));
+    rest.remove_prefix(std::min(rest.size(), words.back().size() + 1));
   }
-  return "";
+  if (words.size() < 2) return "";  // 'cells', 'n': a name, no suffix
+  if (words.back() == "density") return density_unit(words);
+  const std::string unit(unit_of_word(words.back()));
+  if (unit.empty() || words.size() < 3 || words[words.size() - 2] != "per") return unit;
+  const std::string_view counted = words[words.size() - 3];
+  std::string numerator(unit_of_word(counted));
+  if (counted == "std" || counted == "noise") numerator = quantity_unit(words);
+  return (numerator.empty() ? "1" : numerator) + "/" + unit;
 }
 
 }  // namespace config_detail

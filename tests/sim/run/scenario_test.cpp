@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <regex>
 
 #include "physics/physics.h"
 #include "support/temporary_folder.h"
@@ -52,6 +53,61 @@ TEST(Scenario, EveryParameterSaysWhatItMeans) {
   for (const ParameterInfo& p : list_parameters(ScenarioConfig{})) {
     EXPECT_FALSE(p.meaning.empty()) << p.key;
   }
+}
+
+TEST(Scenario, EveryParameterHasTheUnitThatItsNameEndsIn) {
+  // The most particular ending first.
+  const std::pair<const char*, const char*> endings[] = {
+      {"gyro_scale_noise_density", "1/sqrt(Hz)"},
+      {"gyro_noise_density", "rad/s/sqrt(Hz)"},
+      {"gyro_walk_density", "rad/s^2/sqrt(Hz)"},
+      {"accel_noise_density", "m/s^2/sqrt(Hz)"},
+      {"accel_walk_density", "m/s^3/sqrt(Hz)"},
+      {"magnetometer_noise_density", "G/sqrt(Hz)"},
+      {"_density_per_m2", "1/m^2"},
+      {"range_(noise|std)_per_m", "m/m"},
+      {"_s_per_m", "s/m"},
+      {"_nm_per_a", "N m/A"},
+      {"_per_s", "1/s"},
+      {"_kgpm3", "kg/m^3"},
+      {"_kgm2", "kg m^2"},
+      {"_mps3", "m/s^3"},
+      {"_mps2", "m/s^2"},
+      {"_mps", "m/s"},
+      {"_radps3", "rad/s^3"},
+      {"_radps2", "rad/s^2"},
+      {"_radps", "rad/s"},
+      {"_d(eg)?ps", "deg/s"},
+      {"_rad", "rad"},
+      {"_deg", "deg"},
+      {"_m2", "m^2"},
+      {"_m", "m"},
+      {"_ms", "ms"},
+      {"_s", "s"},
+      {"_hz", "Hz"},
+      {"_px", "px"},
+      {"_kg", "kg"},
+      {"_nm", "N m"},
+      {"_n", "N"},
+      {"_wh", "Wh"},
+      {"_ah", "Ah"},
+      {"_w", "W"},
+      {"_v", "V"},
+      {"_a", "A"},
+      {"_ohm", "ohm"},
+      {"_pa", "Pa"},
+      {"_gauss", "G"},
+      {"_(fraction|ratio|share|probability|charge|reflectivity)", "1"},
+  };
+  std::size_t with_unit = 0;
+  for (const ParameterInfo& p : list_parameters(ScenarioConfig{})) {
+    const auto promised = std::find_if(std::begin(endings), std::end(endings), [&](const auto& e) {
+      return std::regex_search(p.key, std::regex(std::string(e.first) + "$"));
+    });
+    EXPECT_EQ(p.unit, promised == std::end(endings) ? "" : promised->second) << p.key;
+    with_unit += p.unit.empty() ? 0 : 1;
+  }
+  EXPECT_GT(with_unit, 200U);
 }
 
 TEST(Scenario, HasTheKeysThatOthersRelyOn) {

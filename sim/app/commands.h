@@ -82,4 +82,7 @@ int report(const ReportArguments& arguments);
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);
 
+/// Prints what every figure of a summary and every column of a run folder is, with its unit.
+int help_figures();
+
 }  // namespace arex::app

@@ -122,6 +122,14 @@ void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = report(arguments); });
 }
 
+void add_help(CLI::App& app, std::string& topic, int& exit_code) {
+  auto* command = app.add_subcommand("help", "say what something is: help figures");
+  command->add_option("topic", topic, "figures: every field of summary.json and column of the CSVs")
+      ->required()
+      ->check(CLI::IsMember({"figures"}));
+  command->callback([&] { exit_code = help_figures(); });
+}
+
 int execute(int argc, char** argv) {
   CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones", "arex"};
   app.require_subcommand(1);
@@ -135,6 +143,7 @@ int execute(int argc, char** argv) {
   ReportArguments report_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
+  std::string help_topic;
   add_run(app, run_arguments, exit_code);
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
@@ -142,6 +151,7 @@ int execute(int argc, char** argv) {
   add_sweep(app, sweep_arguments, exit_code);
   add_sweep_task(app, sweep_task_arguments, exit_code);
   add_report(app, report_arguments, exit_code);
+  add_help(app, help_topic, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);
   params_command->callback([&] { exit_code = params(params_arguments); });

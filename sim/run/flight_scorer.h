@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -12,11 +13,14 @@
 
 namespace arex::sim {
 
-/// What a flight amounts to beside its outcome; most of summary.json.
+/// What a flight amounts to beside its outcome; most of summary.json. Not a number: there was
+/// nothing to measure.
 struct FlightScore {
   double distance_m = 0;
-  double tracking_rmse_m = 0;         ///< true position against the setpoint, take-off to landing
-  double landing_error_m = 0;         ///< horizontal, true resting place against the last target
+  /// True position against the setpoint, from take-off until it begins to land.
+  double tracking_rmse_m = std::numeric_limits<double>::quiet_NaN();
+  /// Horizontal, true resting place against the last target, where it landed on that.
+  double landing_error_m = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> target_miss_m;  ///< true distance from each target when it was reported
   std::vector<PosePair> poses;        ///< truth and estimate at 200 Hz
   OdometryScore odometry;
@@ -47,12 +51,12 @@ class FlightScorer {
   [[nodiscard]] FlightScore score(const Truth& truth, const Stack& stack) const;
 
  private:
-  void write_row(const Truth& truth, const Pose& X_OB, double tracking_error,
+  void write_row(const Truth& truth, const Pose& X_OB, double tracking_error, double clearance,
                  const BatteryState& battery, Recorder& recorder) const;
+  [[nodiscard]] double landing_error(const Truth& truth, const Mission& mission) const;
 
   ClearanceMeter clearance_;
   ThinBranchMeter thin_;
-  double last_clearance_m_ = 0;
   Pose X_WO_;
   std::vector<PosePair> poses_;
   double odometry_lost_s_ = 0;
@@ -61,6 +65,7 @@ class FlightScorer {
   double tracking_sum_ = 0;
   std::size_t tracking_count_ = 0;
   std::vector<double> target_miss_m_;
+  std::optional<Vec3> landing_O_;  ///< the target above which it began to land
 };
 
 }  // namespace arex::sim

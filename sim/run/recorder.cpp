@@ -5,11 +5,13 @@
 
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "mapping/cloud_io.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 namespace {
@@ -38,6 +40,15 @@ std::string csv_quoted(const std::string& text) {
   return quoted + "\"";
 }
 
+// distance_m,angle_rad,direction,revenue: empty for a candidate that was dropped before they were
+// worked out.
+std::string terms_of(const Candidate& c) {
+  if (c.verdict != Verdict::kKept && c.verdict != Verdict::kOffDirection) return ",,,";
+  const double angle = c.angle_rad.value_or(std::numeric_limits<double>::quiet_NaN());
+  return csv_number(c.distance_m, 3) + "," + csv_number(angle, 4) + "," +
+         csv_number(c.direction, 4) + "," + csv_number(c.revenue, 4);
+}
+
 }  // namespace
 
 Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_yaml)
@@ -54,23 +65,18 @@ Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_
   write_file("resolved.yaml", resolved_yaml);
   truth_ = open("truth.tum", "# time_s x_m y_m z_m qx qy qz qw (true X_OB)\n");
   estimate_ = open("estimate.tum", "# time_s x_m y_m z_m qx qy qz qw (estimated X_OB)\n");
-  events_ = open("events.csv", "time_s,kind,detail\n");
-  flight_ = open("flight.csv",
-                 "time_s,speed_mps,tracking_error_m,odometry_error_m,odometry_yaw_error_rad,"
-                 "clearance_m,height_m,"
-                 "battery_voltage_v,battery_power_w,battery_fraction\n");
-  decisions_ = open("decisions.csv",
-                    "time_s,decision,kind,source,previous_end,stop_reason,candidate,winner,x_m,y_m,"
-                    "verdict,information_m2,distance_m,angle_rad,direction,revenue\n");
+  events_ = open("events.csv", csv_header("events.csv"));
+  flight_ = open("flight.csv", csv_header("flight.csv"));
+  decisions_ = open("decisions.csv", csv_header("decisions.csv"));
   flush();
 }
 
 Recorder::~Recorder() = default;
 
-Recorder::File Recorder::open(const char* name, const char* header) {
+Recorder::File Recorder::open(const char* name, const std::string& header) {
   File file(std::fopen((directory_ / name).c_str(), "w"), &std::fclose);
   if (!file) fail(directory_ / name);
-  std::fputs(header, file.get());
+  std::fputs(header.c_str(), file.get());
   return file;
 }
 
@@ -85,9 +91,10 @@ void Recorder::event(const Event& event) {
 }
 
 void Recorder::flight(const FlightRow& row) {
-  std::fprintf(flight_.get(), "%.3f,%.4f,%.4f,%.4f,%.5f,%.4f,%.4f,%.3f,%.1f,%.5f\n",
-               to_seconds(row.stamp), row.speed_mps, row.tracking_error_m, row.odometry_error_m,
-               row.odometry_yaw_error_rad, row.clearance_m, row.height_m, row.battery_voltage_v,
+  std::fprintf(flight_.get(), "%.3f,%.4f,%s,%.4f,%.5f,%s,%.4f,%.3f,%.1f,%.5f\n",
+               to_seconds(row.stamp), row.speed_mps, csv_number(row.tracking_error_m, 4).c_str(),
+               row.odometry_error_m, row.odometry_yaw_error_rad,
+               csv_number(row.clearance_m, 4).c_str(), row.height_m, row.battery_voltage_v,
                row.battery_power_w, row.battery_fraction);
 }
 
@@ -105,13 +112,10 @@ void Recorder::decision(const Decision& decision) {
   }
   for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
     const Candidate& c = decision.candidates[i];
-    std::array<char, 24> angle{};
-    if (c.angle_rad) std::snprintf(angle.data(), angle.size(), "%.4f", *c.angle_rad);
-    std::fprintf(decisions_.get(), "%.3f,%d,%s,%zu,%d,%.2f,%.2f,%s,%.3f,%.3f,%s,%.4f,%.4f\n",
+    std::fprintf(decisions_.get(), "%.3f,%d,%s,%zu,%d,%.2f,%.2f,%s,%.3f,%s\n",
                  to_seconds(decision.stamp), decision.sequence, head.c_str(), i,
                  decision.winner == i ? 1 : 0, c.point.x(), c.point.y(),
-                 name(kVerdictNames, c.verdict).c_str(), c.information_m2, c.distance_m,
-                 angle.data(), c.direction, c.revenue);
+                 name(kVerdictNames, c.verdict).c_str(), c.information_m2, terms_of(c).c_str());
   }
 }
 
@@ -130,7 +134,7 @@ void Recorder::check(std::FILE* file, const char* name) {
 void Recorder::write_cloud(const std::vector<Vec3f>& points_O,
                            const std::vector<CloudGrowth>& growth) const {
   if (!write_pcd(directory_ / "cloud.pcd", points_O)) fail(directory_ / "cloud.pcd");
-  std::string csv = "time_s,points\n";
+  std::string csv = csv_header("cloud_growth.csv");
   std::array<char, 64> line{};
   for (const CloudGrowth& row : growth) {
     std::snprintf(line.data(), line.size(), "%.3f,%zu\n", to_seconds(row.stamp), row.points);

@@ -14,7 +14,7 @@
 
 namespace arex::sim {
 
-/// One row of flight.csv: what a report plots against time.
+/// One row of flight.csv: what a report plots against time. Not a number: an empty cell.
 struct FlightRow {
   Stamp stamp = 0;
   double speed_mps = 0;         ///< true
@@ -67,7 +67,7 @@ class Recorder {
 
  private:
   using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
-  File open(const char* name, const char* header);
+  File open(const char* name, const std::string& header);
   void check(std::FILE* file, const char* name);
 
   std::filesystem::path directory_;

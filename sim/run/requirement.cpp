@@ -2,11 +2,13 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "run/markup.h"
-#include "run/summary.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 namespace {
@@ -24,12 +26,18 @@ constexpr std::array<std::pair<std::string_view, Relation>, 6> kRelations{{
     {"<", Relation::kLess},
 }};
 
-std::optional<double> number(const std::string& text) {
-  double value = 0;
+template <class T>
+std::optional<T> parse(const std::string& text) {
+  T value{};
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
   if (result.ec != std::errc() || result.ptr != end) return std::nullopt;
   return value;
+}
+
+std::optional<double> number(const std::string& text) {
+  const auto value = parse<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 std::string trimmed(const std::string& text) {
@@ -51,7 +59,8 @@ ordered_json field_at(const ordered_json& summary, std::string_view key) {
   return *node;
 }
 
-bool holds(double value, Relation relation, double bound) {
+template <class T>
+bool holds(T value, Relation relation, T bound) {
   switch (relation) {
     case Relation::kAtLeast:
       return value >= bound;
@@ -68,13 +77,22 @@ bool holds(double value, Relation relation, double bound) {
   }
 }
 
-void check_key(const Requirement& requirement, const std::string& where,
-               const ordered_json& summary) {
+// Seeds and counts are compared as what they are: beyond 2^53 a double is another number.
+bool number_holds(const ordered_json& field, const Requirement& requirement) {
+  const auto whole = parse<std::uint64_t>(requirement.value);
+  if (whole && field.is_number_unsigned()) {
+    return holds(field.get<std::uint64_t>(), requirement.relation, *whole);
+  }
+  return holds(field.get<double>(), requirement.relation, number(requirement.value).value());
+}
+
+const FigureInfo& figure_of(const Requirement& requirement, const std::string& where) {
   std::vector<std::string> known;
-  for (const auto& [key, text] : flatten(summary)) known.push_back(key);
+  for (const FigureInfo& figure : figure_list()) known.push_back(figure.column());
   ConfigNode node;
   node.entries.push_back({requirement.key, where, {}});
   config_detail::reject_unknown(node, known);
+  return *find_figure(requirement.key);
 }
 
 std::string test_case(const std::string& suite, const std::string& name, const std::string& time,
@@ -102,10 +120,7 @@ Requirement parse_requirement(const std::string& text) {
   if (requirement.key.empty() || requirement.value.empty()) {
     config_detail::fail(where, "expected FIELD>=VALUE, or one of > <= < == !=");
   }
-  const ordered_json summary = full_summary();
-  check_key(requirement, where, summary);
-  const ordered_json field = field_at(summary, requirement.key);
-  if (!field.is_string()) {
+  if (figure_of(requirement, where).kind != FigureInfo::Kind::kText) {
     if (!number(requirement.value)) {
       config_detail::fail(where, "'" + requirement.value + "' is not a number, expected one");
     }
@@ -118,13 +133,13 @@ Requirement parse_requirement(const std::string& text) {
 
 std::string violation(const Requirement& requirement, const ordered_json& summary) {
   const ordered_json field = field_at(summary, requirement.key);
-  if (field.is_null()) return requirement.key + " has no value";
+  if (field.is_null()) return requirement.key + " has no value in this run";
   bool met = false;
   if (field.is_string()) {
     const bool same = field.get<std::string>() == requirement.value;
     met = same == (requirement.relation == Relation::kEqual);
   } else {
-    met = holds(field.get<double>(), requirement.relation, number(requirement.value).value());
+    met = number_holds(field, requirement);
   }
   if (met) return "";
   return requirement.key + " is " + (field.is_string() ? field.get<std::string>() : field.dump());

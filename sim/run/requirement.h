@@ -17,8 +17,8 @@ struct Requirement {
   std::string value;
 };
 
-/// @throws ConfigError for what is no condition, a field that no summary has, or a value that such
-/// a field cannot have.
+/// @throws ConfigError for what is no condition, a field that is none of figure_list(), or a value
+/// that such a field cannot have.
 Requirement parse_requirement(const std::string& text);
 
 /// Why it is not met, in one line; empty if it is. A field that the summary has no value for meets

@@ -85,13 +85,31 @@ struct Simulation::LidarFrame {
 
 void ExplorationLog::add(const Decision& decision) {
   ++decisions;
+  seen += decision.previous_end == TargetEnd::kSeen;
+  given_up += decision.previous_end == TargetEnd::kUnreachable ||
+              decision.previous_end == TargetEnd::kCutOff;
   if (decision.kind == DecisionKind::kNewTarget) {
-    ++targets;
+    ++issued;
     exhaustive += decision.source != CandidateSource::kTrees;
   } else if (decision.kind == DecisionKind::kStop) {
     stop_reason = decision.stop_reason;
     open_frontier_m2 = decision.open_frontier_m2;
   }
+}
+
+void ExplorationLog::add_figures(Figures& figures) const {
+  if (decisions == 0) return;
+  figures.set("exploration.decisions", decisions);
+  figures.set("exploration.targets", issued);
+  figures.set("exploration.targets_issued", issued);
+  figures.set("exploration.targets_seen", seen);
+  figures.set("exploration.targets_reached", reached);
+  figures.set("exploration.targets_given_up", given_up);
+  figures.set("exploration.exhaustive", exhaustive);
+  if (stop_reason != StopReason::kNone) {
+    figures.set("exploration.stop", kStopReasonNames[static_cast<std::size_t>(stop_reason)]);
+  }
+  figures.set("exploration.open_frontier_m2", open_frontier_m2);
 }
 
 Simulation::Simulation(const Scenario& scenario, int threads)
@@ -239,7 +257,10 @@ void Simulation::record() {
   const StageTimer::Scope timed(timers_.recording);
   const Truth& truth = physics_.truth();
   for (const Event& event : stack_.take_events()) {
-    if (event.kind == EventKind::kTargetReached) scorer_.target_reached(truth, stack_);
+    if (event.kind == EventKind::kTargetReached) {
+      scorer_.target_reached(truth, stack_);
+      exploration_.reached += stack_.mission().state() == MissionState::kExplore;
+    }
     if (recorder_) recorder_->event(event);
   }
   if (now_ % FlightScorer::kPeriod == 0) {
@@ -271,7 +292,9 @@ void Simulation::score_coverage() {
                    const auto points = stack_.perception().cloud().points(covered_points_);
                    covered_points_ += points.size();
                    coverage_->update(stamp, distance, *map, volume, points, X_WO);
-                   return [this, row = coverage_->latest()] { area_fraction_ = row.area_fraction; };
+                   return [this, row = coverage_->latest()] {
+                     if (std::isfinite(row.area_fraction)) area_fraction_ = row.area_fraction;
+                   };
                  });
 }
 

@@ -27,12 +27,17 @@ inline constexpr std::array<std::string_view, 7> kOutcomeNames{
 /// What the explorer decided, in sum.
 struct ExplorationLog {
   int decisions = 0;
-  int targets = 0;     ///< decisions for a new one
+  int issued = 0;      ///< decisions for a new target
   int exhaustive = 0;  ///< of these from the exhaustive search, because the trees had none
+  int seen = 0;        ///< targets dropped because they were seen on the way
+  int given_up = 0;    ///< targets that proved unreachable, or were cut off
+  int reached = 0;     ///< targets that the mission said it reached while exploring
   StopReason stop_reason = StopReason::kNone;
   std::optional<double> open_frontier_m2;  ///< see Decision
 
   void add(const Decision& decision);
+  /// Sets the figures `exploration.*`, if the explorer was ever asked.
+  void add_figures(Figures& figures) const;
 };
 
 /// What a flight amounts to; summary.json comes from it.

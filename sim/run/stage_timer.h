@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -40,13 +41,15 @@ class StageTimer {
 struct TimingRow {
   std::string module;
   std::size_t calls = 0;
-  double median_ms = 0;
-  double p99_ms = 0;
+  double median_ms = std::numeric_limits<double>::quiet_NaN();  ///< of no call there is none
+  double p99_ms = std::numeric_limits<double>::quiet_NaN();
   double total_s = 0;
 };
 
 inline TimingRow summarise(const std::string& module, std::vector<float> seconds) {
-  TimingRow row{module, seconds.size(), 0, 0, 0};
+  TimingRow row;
+  row.module = module;
+  row.calls = seconds.size();
   if (seconds.empty()) return row;
   std::sort(seconds.begin(), seconds.end());
   row.median_ms = 1e3 * static_cast<double>(seconds[seconds.size() / 2]);

@@ -17,19 +17,17 @@ struct HostTime {
   double cpu_s = 0;
 };
 
-/// summary.json: the contract's names. Sections that this run has no module for are null.
+/// summary.json: every figure of figure_list(). What this run had no module for, or nothing to
+/// measure, is null.
 nlohmann::ordered_json summarise(const Scenario& scenario, const FlightResult& result,
                                  const HostTime& host);
 
 /// Every number and text of a summary with its dotted key; a list by its length, `targets.count`.
 std::vector<std::pair<std::string, std::string>> flatten(const nlohmann::ordered_json& summary);
 
-/// A summary that has every section, whatever its values: what fields there are.
-nlohmann::ordered_json full_summary();
-
 /// Whether a summary's field, by its dotted key, is a time of the host: two runs of one scenario
 /// differ in these only.
-bool depends_on_host(std::string_view key);
+bool depends_on_host(std::string_view column);
 
 /// odometry_error.csv: estimate minus truth, aligned at the first pose; position in W, m, and
 /// rotation vector in W, rad.

@@ -70,4 +70,9 @@ ClearanceMeter::Statistics ClearanceMeter::statistics() const {
   return {*std::min_element(sorted.begin(), p05 + 1), *p05, samples_.size()};
 }
 
+void add_figures(const ClearanceMeter::Statistics& clearance, Figures& figures) {
+  figures.set("clearance.min_m", clearance.min_m);
+  figures.set("clearance.p05_m", clearance.p05_m);
+}
+
 }  // namespace arex::sim

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "physics/airframe.h"
 #include "physics/truth.h"
+#include "scoring/figures.h"
 #include "sensors/scene.h"
 
 namespace arex::sim {
@@ -18,9 +20,10 @@ class ClearanceMeter {
   /// Clearance at one pose, m, at most `max_m`; remembered for the statistics.
   double measure(const Truth& truth, double max_m = 5.0);
 
+  /// Not a number: it was never measured.
   struct Statistics {
-    double min_m = 0;
-    double p05_m = 0;
+    double min_m = std::numeric_limits<double>::quiet_NaN();
+    double p05_m = std::numeric_limits<double>::quiet_NaN();
     std::size_t samples = 0;
   };
   [[nodiscard]] Statistics statistics() const;
@@ -33,5 +36,8 @@ class ClearanceMeter {
   std::vector<double> samples_;
   Pose X_WB_;  ///< of the newest sample
 };
+
+/// Sets the figures `clearance.*`.
+void add_figures(const ClearanceMeter::Statistics& clearance, Figures& figures);
 
 }  // namespace arex::sim

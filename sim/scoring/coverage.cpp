@@ -176,7 +176,8 @@ void CoverageScorer::update(Stamp stamp, double distance_m, const OccupancyMap2D
   count_area(map, X_WO);
   for (const Vec3f& p_O : new_points_O) mark_near((X_WO * p_O.cast<double>()).cast<float>());
   const auto share = [](std::size_t part, std::size_t whole) {
-    return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+    return whole == 0 ? CoverageRow::kUnknown
+                      : static_cast<double>(part) / static_cast<double>(whole);
   };
   latest_ = {stamp, distance_m, share(known_count_, known_.size()),
              share(mapped_count_, samples_.size()), free_volume_m3};
@@ -211,13 +212,31 @@ CoverageResult CoverageScorer::result() const {
   return result;
 }
 
+void add_figures(const CoverageResult& coverage, Figures& figures) {
+  figures.set("coverage.area_fraction", coverage.area_fraction);
+  figures.set("coverage.surface_fraction", coverage.surface_fraction);
+  figures.set("coverage.volume_m3", coverage.volume_m3);
+  figures.set("coverage.t50_s", coverage.t50_s);
+  figures.set("coverage.t90_s", coverage.t90_s);
+  figures.set("coverage.t95_s", coverage.t95_s);
+  figures.set("coverage.revisit_ratio", coverage.revisit_ratio);
+  figures.set("coverage.heading_change_radpm", coverage.heading_change_radpm);
+  figures.set("coverage.reachable_area_m2", coverage.area_m2);
+  figures.set("coverage.surface_samples", coverage.surface_samples);
+  for (std::size_t i = 0; i < coverage.classes.size(); ++i) {
+    const ClassCoverage& c = coverage.classes[i];
+    const std::string name(worlds::kSurfaceClassNames[i]);
+    figures.set("coverage.surface_fraction_by_class." + name,
+                static_cast<double>(c.mapped) / static_cast<double>(c.visible));  // 0 / 0: none
+  }
+}
+
 std::string write_coverage_csv(std::span<const CoverageRow> rows) {
-  std::string text = "time_s,distance_m,area_fraction,surface_fraction,volume_m3\n";
+  std::string text = csv_header("coverage.csv");
   for (const CoverageRow& row : rows) {
-    std::array<char, 160> line;
-    std::snprintf(line.data(), line.size(), "%.3f,%.3f,%.5f,%.5f,%.3f\n", to_seconds(row.stamp),
-                  row.distance_m, row.area_fraction, row.surface_fraction, row.volume_m3);
-    text += line.data();
+    text += csv_number(to_seconds(row.stamp), 3) + "," + csv_number(row.distance_m, 3) + "," +
+            csv_number(row.area_fraction, 5) + "," + csv_number(row.surface_fraction, 5) + "," +
+            csv_number(row.volume_m3, 3) + "\n";
   }
   return text;
 }

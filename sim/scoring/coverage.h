@@ -9,6 +9,7 @@
 
 #include "mapping/occupancy_map_2d.h"
 #include "math/pose.h"
+#include "scoring/figures.h"
 #include "scoring/path_meter.h"
 #include "scoring/reachable_space.h"
 #include "scoring/surface_samples.h"
@@ -43,13 +44,15 @@ struct CoverageConfig {
   }
 };
 
-/// Coverage at one time; a row of coverage.csv.
+/// Coverage at one time; a row of coverage.csv. Not a number: not scored yet, or there is nothing
+/// to be a share of.
 struct CoverageRow {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   Stamp stamp = 0;
-  double distance_m = 0;        ///< flown so far
-  double area_fraction = 0;     ///< of the reachable free area in the band, known to the 2D map
-  double surface_fraction = 0;  ///< of the visible surface samples, near a map point
-  double volume_m3 = 0;         ///< free volume of the 3D map
+  double distance_m = 0;               ///< flown so far
+  double area_fraction = kUnknown;     ///< of the reachable free area in the band, in the 2D map
+  double surface_fraction = kUnknown;  ///< of the visible surface samples, near a map point
+  double volume_m3 = kUnknown;         ///< free volume of the 3D map
 };
 
 struct ClassCoverage {
@@ -57,16 +60,18 @@ struct ClassCoverage {
   std::size_t mapped = 0;   ///< of those, near a map point
 };
 
+/// Not a number: never reached, or there was nothing to measure.
 struct CoverageResult {
-  double area_fraction = 0;
-  double surface_fraction = 0;
-  double volume_m3 = 0;
-  // When the area fraction first reached the share; NaN if it never did.
-  double t50_s = std::numeric_limits<double>::quiet_NaN();
-  double t90_s = std::numeric_limits<double>::quiet_NaN();
-  double t95_s = std::numeric_limits<double>::quiet_NaN();
-  double revisit_ratio = 0;
-  double heading_change_radpm = 0;
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  double area_fraction = kUnknown;
+  double surface_fraction = kUnknown;
+  double volume_m3 = kUnknown;
+  // When the area fraction first reached the share.
+  double t50_s = kUnknown;
+  double t90_s = kUnknown;
+  double t95_s = kUnknown;
+  double revisit_ratio = kUnknown;
+  double heading_change_radpm = kUnknown;
 
   // The denominators.
   double area_m2 = 0;
@@ -138,6 +143,9 @@ class CoverageScorer {
   CoverageRow latest_;
   std::vector<CoverageRow> rows_;
 };
+
+/// Sets the figures `coverage.*`.
+void add_figures(const CoverageResult& coverage, Figures& figures);
 
 /// coverage.csv, header included.
 std::string write_coverage_csv(std::span<const CoverageRow> rows);

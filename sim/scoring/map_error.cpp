@@ -58,4 +58,13 @@ MapScore score_map(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, const Sc
   return score;
 }
 
+void add_figures(const MapScore& score, Figures& figures) {
+  figures.set("map.points", score.points);
+  figures.set("map.median_m", score.median_m);
+  figures.set("map.p95_m", score.p95_m);
+  figures.set("map.outlier_fraction", score.outlier_fraction);
+  figures.set("map.scored", score.scored);
+  figures.set("map.foliage", score.foliage);
+}
+
 }  // namespace arex::sim

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "math/pose.h"
+#include "scoring/figures.h"
 #include "sensors/scene.h"
 #include "worlds/world.h"
 
@@ -28,15 +30,19 @@ struct MapErrorConfig {
   }
 };
 
-/// How far an estimated map lies from the true surfaces.
+/// How far an estimated map lies from the true surfaces. Not a number: no point was measured.
 struct MapScore {
-  std::size_t points = 0;       ///< of the cloud
-  std::size_t scored = 0;       ///< of those, measured
-  std::size_t foliage = 0;      ///< of those looked at, left out as foliage
-  double median_m = 0;          ///< of the distances to the nearest true surface
-  double p95_m = 0;             ///< their 95th percentile
-  double outlier_fraction = 0;  ///< share further than outlier_m
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  std::size_t points = 0;              ///< of the cloud
+  std::size_t scored = 0;              ///< of those, measured
+  std::size_t foliage = 0;             ///< of those looked at, left out as foliage
+  double median_m = kUnknown;          ///< of the distances to the nearest true surface
+  double p95_m = kUnknown;             ///< their 95th percentile
+  double outlier_fraction = kUnknown;  ///< share further than outlier_m
 };
+
+/// Sets the figures `map.*`.
+void add_figures(const MapScore& score, Figures& figures);
 
 /// Surfaces to be mapped: all but leaves, shrubs and ferns.
 inline constexpr worlds::ClassSet kWithoutFoliage = worlds::ClassSet::all()

@@ -53,7 +53,7 @@ double relative_error(const std::vector<PosePair>& pairs, double path_m, std::si
     sum += (true_step.inverse() * estimated_step).p.squaredNorm();
     ++count;
   }
-  return count ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+  return count ? std::sqrt(sum / static_cast<double>(count)) : OdometryScore::kUnknown;
 }
 
 OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
@@ -64,16 +64,18 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
   double sum_start = 0;
   double sum_best = 0;
   double yaw_max = 0;
+  double error2_max = 0;
   for (const PosePair& pair : pairs) {
     const Pose aligned = X_WO_start * pair.X_OB;
     const double error2 = (aligned.p - pair.X_WB.p).squaredNorm();
     sum_start += error2;
     sum_best += (X_WO_best * pair.X_OB.p - pair.X_WB.p).squaredNorm();
-    score.ate_max_m = std::max(score.ate_max_m, std::sqrt(error2));
+    error2_max = std::max(error2_max, error2);
     yaw_max = std::max(yaw_max, std::abs(so3::wrap(so3::yaw(aligned.R) - so3::yaw(pair.X_WB.R))));
   }
   const auto count = static_cast<double>(pairs.size());
   score.ate_rmse_m = std::sqrt(sum_start / count);
+  score.ate_max_m = std::sqrt(error2_max);
   score.ate_se3_rmse_m = std::sqrt(sum_best / count);
   score.yaw_error_max_deg = yaw_max * 180 / std::numbers::pi;
   score.start_tilt_deg =
@@ -81,6 +83,16 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
   score.rpe_1m_m = relative_error(pairs, 1.0);
   score.rpe_10m_m = relative_error(pairs, 10.0);
   return score;
+}
+
+void add_figures(const OdometryScore& score, Figures& figures) {
+  figures.set("odometry.ate_rmse_m", score.ate_rmse_m);
+  figures.set("odometry.ate_max_m", score.ate_max_m);
+  figures.set("odometry.ate_se3_rmse_m", score.ate_se3_rmse_m);
+  figures.set("odometry.yaw_error_max_deg", score.yaw_error_max_deg);
+  figures.set("odometry.start_tilt_deg", score.start_tilt_deg);
+  figures.set("odometry.rpe_1m_m", score.rpe_1m_m);
+  figures.set("odometry.rpe_10m_m", score.rpe_10m_m);
 }
 
 }  // namespace arex::sim

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "math/pose.h"
 #include "math/types.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 
@@ -15,15 +17,17 @@ struct PosePair {
 };
 
 /// How far an odometry is from the truth over one run. Definitions as in Zhang and Scaramuzza, A
-/// tutorial on quantitative trajectory evaluation, IROS 2018, and as `evo` computes them.
+/// tutorial on quantitative trajectory evaluation, IROS 2018, and as `evo` computes them. Not a
+/// number: there was nothing to measure.
 struct OdometryScore {
-  double ate_rmse_m = 0;         ///< absolute position error, aligned at the first pose only
-  double ate_max_m = 0;          ///< its largest value
-  double ate_se3_rmse_m = 0;     ///< after the best rigid alignment of the whole run
-  double yaw_error_max_deg = 0;  ///< heading error, aligned at the first pose
-  double start_tilt_deg = 0;     ///< how far O's z axis lies from the vertical: gravity at start-up
-  double rpe_1m_m = 0;           ///< relative position error over 1 m of path, RMS
-  double rpe_10m_m = 0;          ///< the same over 10 m; 0 if the path is shorter
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  double ate_rmse_m = kUnknown;         ///< absolute position error, aligned at the first pose only
+  double ate_max_m = kUnknown;          ///< its largest value
+  double ate_se3_rmse_m = kUnknown;     ///< after the best rigid alignment of the whole run
+  double yaw_error_max_deg = kUnknown;  ///< heading error, aligned at the first pose
+  double start_tilt_deg = kUnknown;     ///< of O's z axis from the vertical: gravity at start-up
+  double rpe_1m_m = kUnknown;           ///< relative position error over 1 m of path, RMS
+  double rpe_10m_m = kUnknown;          ///< the same over 10 m
 };
 
 /// The pose of O in W that makes the first pair agree.
@@ -36,11 +40,15 @@ Pose align_rigid(const std::vector<PosePair>& pairs);
 /// so that its positions tell no rotation; then align_at_start().
 Pose align_map(const std::vector<PosePair>& pairs);
 
-/// RMS of the relative position error over all sub-paths of true length `path_m`.
+/// RMS of the relative position error over all sub-paths of true length `path_m`; not a number if
+/// the path is shorter.
 /// @param stride every stride-th pose starts a sub-path.
 double relative_error(const std::vector<PosePair>& pairs, double path_m, std::size_t stride = 10);
 
-/// @pre pairs are in order of time. An empty run scores zero.
+/// @pre pairs are in order of time. An empty run has no score.
 OdometryScore score_odometry(const std::vector<PosePair>& pairs);
+
+/// Sets the figures `odometry.*` that the poses tell.
+void add_figures(const OdometryScore& score, Figures& figures);
 
 }  // namespace arex::sim

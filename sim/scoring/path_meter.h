@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <unordered_map>
 
 #include "math/types.h"
@@ -34,16 +35,19 @@ class PathMeter {
   void add(const Vec3& p_W, bool mapped);
 
   [[nodiscard]] double length_m() const { return length_m_; }
-  /// Share of the path inside cells that were mapped, visited and left before.
+  /// Share of the path inside cells that were mapped, visited and left before; not a number
+  /// without a path.
   [[nodiscard]] double revisit_ratio() const {
-    return length_m_ > 0 ? revisited_m_ / length_m_ : 0;
+    return length_m_ > 0 ? revisited_m_ / length_m_ : kUnknown;
   }
-  /// Sum of the course's absolute changes over the path's length, in rad/m.
+  /// Sum of the course's absolute changes over the path's length, in rad/m; not a number without
+  /// a path.
   [[nodiscard]] double heading_change_radpm() const {
-    return chords_m_ > 0 ? turned_rad_ / chords_m_ : 0;
+    return chords_m_ > 0 ? turned_rad_ / chords_m_ : kUnknown;
   }
 
  private:
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   struct Visit {
     double last_m = 0;      ///< where on the path the cell was last entered or crossed
     bool returned = false;  ///< the present stay is a revisit

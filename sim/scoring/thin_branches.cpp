@@ -124,4 +124,13 @@ ThinBranchScore ThinBranchMeter::score() const {
   return score;
 }
 
+void add_figures(const ThinBranchScore& score, Figures& figures) {
+  figures.set("thin.branches", score.branches);
+  figures.set("thin.seen_in_time", score.seen_in_time);
+  // Of no branch there is no share: 0 / 0.
+  figures.set("thin.seen_in_time_fraction",
+              score.seen_in_time / static_cast<double>(score.branches));
+  figures.set("thin.in_grid_fraction", score.in_grid / static_cast<double>(score.branches));
+}
+
 }  // namespace arex::sim

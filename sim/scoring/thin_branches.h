@@ -6,6 +6,7 @@
 #include "mapping/grid_view.h"
 #include "math/pose.h"
 #include "physics/truth.h"
+#include "scoring/figures.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
@@ -42,6 +43,9 @@ struct ThinBranchScore {
   int seen_in_time = 0;  ///< an occupied cell showed them at some moment up to their deadline
   int in_grid = 0;       ///< and still at that deadline: what the planner has to brake by
 };
+
+/// Sets the figures `thin.*`.
+void add_figures(const ThinBranchScore& score, Figures& figures);
 
 /// Were the thin branches beside the flight in the local grid before it was too late?
 ///

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "run/summary.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 namespace {
@@ -50,7 +51,10 @@ std::string joined(const std::vector<std::string>& cells) {
 /// A table whose rows come with named cells behind fixed ones.
 class Table {
  public:
-  explicit Table(std::vector<std::string> head) : head_(std::move(head)) {}
+  /// @param expected columns that are there whatever the rows hold
+  Table(std::vector<std::string> head, const Fields& expected) : head_(std::move(head)) {
+    columns_.add(expected);
+  }
 
   void add(std::vector<std::string> cells, Fields fields) {
     columns_.add(fields);
@@ -113,13 +117,20 @@ Fields part_of(const Fields& fields, bool host) {
   return part;
 }
 
+// Every figure's column, so that a table's columns do not depend on what its runs measured.
+Fields empty_fields() {
+  Fields fields;
+  for (const FigureInfo& figure : figure_list()) fields.emplace_back(figure.column(), "");
+  return fields;
+}
+
 }  // namespace
 
 SweepTables sweep_tables(const SweepPlan& plan, const SweepFolder& folder) {
   std::vector<std::string> head = identity_head(plan);
-  Table host(head);
+  Table host(head, part_of(empty_fields(), true));
   head.insert(head.end(), {"failure", "detail"});
-  Table results(head);
+  Table results(head, part_of(empty_fields(), false));
   for (const PlannedRun& run : plan.runs) {
     const auto summary = folder.summary(run.id);
     const RunState state = summary ? RunState{Failure::kNone, ""} : folder.state(run.id);

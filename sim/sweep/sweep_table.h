@@ -9,7 +9,7 @@ namespace arex::sim {
 /// sweep.csv and sweep_host.csv.
 struct SweepTables {
   /// One row a run, in the plan's order: run,scenario[,variant],KEYS...,seed[,repeat],failure,
-  /// detail,SUMMARY... The same runs give the same bytes, whatever happened on the way.
+  /// detail,FIGURES... The same runs give the same bytes, whatever happened on the way.
   std::string results;
   /// run,host,attempt and what the clocks of the host say.
   std::string host;

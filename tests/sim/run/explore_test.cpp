@@ -31,7 +31,7 @@ void expect_explored(const FlightResult& result, double area_fraction, double su
   EXPECT_GE(result.coverage->area_fraction, area_fraction);
   EXPECT_GE(result.coverage->surface_fraction, surface_fraction);
   EXPECT_GT(result.battery.state_of_charge, 0.2);  // the reserve is kept
-  EXPECT_GT(result.exploration.targets, 3);
+  EXPECT_GT(result.exploration.issued, 3);
   // It stopped because nothing larger than the threshold was left that it could reach.
   EXPECT_NE(result.exploration.stop_reason, StopReason::kBattery);
   EXPECT_LT(result.exploration.open_frontier_m2.value(), StopConfig{}.min_area_m2);

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "scoring/figures.h"
+
 namespace arex::sim {
 namespace {
 
@@ -40,9 +42,9 @@ TEST(Requirement, ComparesNumbersAndTexts) {
   EXPECT_EQ(verdict("targets.count<=1"), "targets.count is 2");
   EXPECT_EQ(verdict("outcome==stuck"), "outcome is succeeded");
   // No value meets nothing, whichever way it is asked.
-  EXPECT_EQ(verdict("coverage.t90_s<=100"), "coverage.t90_s has no value");
-  EXPECT_EQ(verdict("coverage.t90_s>100"), "coverage.t90_s has no value");
-  EXPECT_EQ(verdict("planner.failures==0"), "planner.failures has no value");
+  EXPECT_EQ(verdict("coverage.t90_s<=100"), "coverage.t90_s has no value in this run");
+  EXPECT_EQ(verdict("coverage.t90_s>100"), "coverage.t90_s has no value in this run");
+  EXPECT_EQ(verdict("planner.failures==0"), "planner.failures has no value in this run");
 }
 
 TEST(Requirement, RefusesWhatNoSummaryCanSay) {
@@ -58,6 +60,27 @@ TEST(Requirement, RefusesWhatNoSummaryCanSay) {
             "--require collisions==none: 'none' is not a number, expected one");
   EXPECT_EQ(error_of("outcome>=succeeded"),
             "--require outcome>=succeeded: 'outcome' is a text, expected == or !=");
+}
+
+TEST(Requirement, EveryFieldOfASummaryCanBeRequired) {
+  for (const FigureInfo& figure : figure_list()) {
+    const bool text = figure.kind == FigureInfo::Kind::kText;
+    const std::string condition = figure.column() + (text ? "==x" : ">=1");
+    EXPECT_EQ(error_of(condition), "no error") << condition;
+  }
+  EXPECT_EQ(error_of("exploration.targets>=1"), "no error");
+  EXPECT_EQ(error_of("exploration.open_frontier_m2<1"), "no error");
+  EXPECT_NE(error_of("targets>=1").find("did you mean 'targets.count'?"), std::string::npos);
+  EXPECT_NE(error_of("sim_time_s<=nan").find("not a number"), std::string::npos);
+  EXPECT_NE(error_of("sim_time_s<=inf").find("not a number"), std::string::npos);
+}
+
+TEST(Requirement, ComparesSeedsToTheirLastDigit) {
+  ordered_json summary = kSummary;
+  summary["seed"] = 18446744073709551615U;
+  EXPECT_EQ(violation(parse_requirement("seed==18446744073709551615"), summary), "");
+  EXPECT_EQ(violation(parse_requirement("seed==18446744073709551614"), summary),
+            "seed is 18446744073709551615");
 }
 
 TEST(Junit, HasATestForTheMissionAndForEveryRequirement) {

@@ -77,6 +77,9 @@ TEST(CoverageScorer, NothingMappedIsZeroAndEverythingIsOne) {
   const World world = two_rooms();
   const Scene scene(world);
   CoverageScorer scorer = room_scorer(world, scene);
+  EXPECT_TRUE(std::isnan(scorer.result().area_fraction)) << "never scored";
+  EXPECT_TRUE(std::isnan(scorer.result().surface_fraction));
+  EXPECT_TRUE(std::isnan(scorer.result().volume_m3));
   scorer.update(0, 0, OccupancyMap2D{}, 0, {}, kStart);
   EXPECT_EQ(scorer.latest().area_fraction, 0);
   EXPECT_EQ(scorer.latest().surface_fraction, 0);
@@ -317,6 +320,14 @@ TEST(PathMeter, AStraightPathNeitherTurnsNorReturns) {
   for (int i = 0; i < 200; ++i) meter.add({0.1 * i, 0, 1}, true);
   EXPECT_EQ(meter.revisit_ratio(), 0);
   EXPECT_NEAR(meter.heading_change_radpm(), 0, 1e-12);
+}
+
+TEST(PathMeter, WithoutAPathThereIsNoShareOfIt) {
+  PathMeter meter;
+  EXPECT_TRUE(std::isnan(meter.revisit_ratio()));
+  for (int i = 0; i < 10; ++i) meter.add({1, 2, 0.1 * i}, true);  // straight up
+  EXPECT_TRUE(std::isnan(meter.revisit_ratio()));
+  EXPECT_TRUE(std::isnan(meter.heading_change_radpm()));
 }
 
 }  // namespace

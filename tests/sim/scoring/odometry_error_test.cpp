@@ -85,5 +85,22 @@ TEST(OdometryScore, ReportsTheLargestHeadingError) {
   EXPECT_NEAR(score_odometry(pairs).yaw_error_max_deg, 2.0, 1e-9);
 }
 
+TEST(OdometryError, WhatWasNotFlownIsNotScored) {
+  const OdometryScore none = score_odometry({});
+  for (const double figure : {none.ate_rmse_m, none.ate_max_m, none.ate_se3_rmse_m,
+                              none.yaw_error_max_deg, none.start_tilt_deg, none.rpe_1m_m}) {
+    EXPECT_TRUE(std::isnan(figure));
+  }
+  std::vector<PosePair> pairs;
+  for (int i = 0; i <= 500; ++i) {  // 5 m straight on, without error
+    const Pose X{Mat3::Identity(), {0.01 * i, 0, 0}};
+    pairs.push_back({i * 5'000'000, X, X});
+  }
+  const OdometryScore score = score_odometry(pairs);
+  EXPECT_LT(score.ate_max_m, 1e-9);
+  EXPECT_LT(score.rpe_1m_m, 1e-9);
+  EXPECT_TRUE(std::isnan(score.rpe_10m_m)) << "the path is shorter";
+}
+
 }  // namespace
 }  // namespace arex::sim

@@ -2,7 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "report/table.h"
 #include "run/summary.h"
+#include "scoring/figures.h"
 #include "support/temporary_folder.h"
 #include "sweep/file_io.h"
 #include "sweep/sweep_table.h"
@@ -123,23 +125,34 @@ TEST_F(SweepFolderTest, AFailureStandsUntilTheRunIsFinished) {
   EXPECT_FALSE(std::filesystem::exists(folder_.root() / SweepFolder::failed("one")));
 }
 
-TEST_F(SweepFolderTest, TheTableHasARowForEveryRunAndTheUnionOfTheirFields) {
+TEST_F(SweepFolderTest, TheTableHasARowForEveryRunAndAColumnForEveryFigure) {
   leave_partial("one", summary("succeeded", R"(,"planner":null,"coverage":{"a":1})"));
   EXPECT_TRUE(folder_.publish("one"));
   leave_partial("two", summary("stuck", R"(,"planner":{"replans":4,"median_ms":2.5},"map":null)"));
   EXPECT_TRUE(folder_.publish("two"));
   const SweepTables tables = sweep_tables(plan_, folder_);
-  EXPECT_EQ(tables.results,
-            "run,scenario,a.b,seed,failure,detail,outcome,planner.replans,map,coverage.a,"
-            "build.version\n"
-            "runs/one,forest,\"one, \"\"x\"\"\",1,,,succeeded,,,1,1\n"
-            "runs/two,forest,\"two, \"\"x\"\"\",1,,,stuck,4,,,1\n"
-            "runs/three,forest,\"three, \"\"x\"\"\",1,missing,,,,,,\n");
-  EXPECT_EQ(tables.host,
-            "run,scenario,a.b,seed,wall_time_s,planner.median_ms\n"
-            "runs/one,forest,\"one, \"\"x\"\"\",1,5,\n"
-            "runs/two,forest,\"two, \"\"x\"\"\",1,5,2.5\n"
-            "runs/three,forest,\"three, \"\"x\"\"\",1,,\n");
+  const Table results = parse_table(tables.results);
+  const Table host = parse_table(tables.host);
+  ASSERT_EQ(results.rows.size(), 3U);
+  ASSERT_EQ(host.rows.size(), 3U);
+  EXPECT_EQ(tables.results.find("run,scenario,a.b,seed,failure,detail,outcome,reason,"), 0U);
+  EXPECT_EQ(tables.host.find("run,scenario,a.b,seed,wall_time_s,"), 0U);
+  for (const FigureInfo& figure : figure_list()) {
+    if (figure.key == "scenario" || figure.key == "seed") continue;
+    EXPECT_EQ(results.column(figure.column()).has_value(), !figure.of_host) << figure.key;
+    EXPECT_EQ(host.column(figure.column()).has_value(), figure.of_host) << figure.key;
+  }
+  EXPECT_EQ(results.rows[0][2], "one, \"x\"");
+  EXPECT_EQ(results.text(0, "outcome"), "succeeded");
+  EXPECT_EQ(results.text(0, "coverage.a"), "1");  // of another version
+  EXPECT_EQ(results.text(0, "planner.replans"), "");
+  EXPECT_EQ(results.text(1, "planner.replans"), "4");
+  EXPECT_EQ(results.text(2, "failure"), "missing");
+  EXPECT_EQ(results.text(2, "outcome"), "");
+  EXPECT_FALSE(results.column("planner"));  // a section without a value is no column
+  EXPECT_FALSE(results.column("map"));
+  EXPECT_EQ(host.text(1, "planner.median_ms"), "2.5");
+  EXPECT_EQ(host.text(0, "planner.median_ms"), "");
 }
 
 }  // namespace

@@ -1,0 +1,320 @@
+#include "scoring/figures.h"
+#include "worlds/world.h"
+
+namespace arex::sim {
+namespace {
+
+using enum Better;
+using Kind = FigureInfo::Kind;
+
+// Each: key, label, unit, better, main, meaning[, kind[, of the host]].
+
+std::vector<FigureInfo> run_figures() {
+  return {
+      {"outcome", "outcome", "", kNeither, true,
+       "succeeded, collided, stuck, lost, timed_out or interrupted", Kind::kText},
+      {"reason", "reason", "", kNeither, true, "why the run ended so", Kind::kText},
+      {"scenario", "scenario", "", kNeither, false, "its name: --name, or the file's", Kind::kText},
+      {"seed", "seed", "", kNeither, false, "of everything random"},
+      {"sim_time_s", "flight time", "s", kLess, true,
+       "simulated, from the start of the run to its end"},
+      {"wall_time_s", "host's time", "s", kNeither, false, "by the wall clock", Kind::kNumber,
+       true},
+      {"cpu_time_s", "host's processor time", "s", kNeither, false, "of all threads", Kind::kNumber,
+       true},
+      {"real_time_factor", "speed of the simulation", "", kNeither, false,
+       "sim_time_s over wall_time_s", Kind::kNumber, true},
+      {"trajectory_hash", "trajectory hash", "", kNeither, false,
+       "of the true state at every tick and every command", Kind::kText},
+      {"sensor_hash", "sensor hash", "", kNeither, false, "of every scan and frame delivered",
+       Kind::kText},
+      {"distance_m", "distance flown", "m", kLess, true, "length of the true path"},
+      {"targets", "targets reached by the mission", "", kNeither, false,
+       "places that the mission reached, the way home included, with the time of each",
+       Kind::kList},
+  };
+}
+
+std::vector<FigureInfo> coverage_figures() {
+  std::vector<FigureInfo> list{
+      {"coverage.area_fraction", "area covered", "1", kMore, true,
+       "share of the reachable free area, in the 2D map's height band, that the 2D map knows; "
+       "explorations only"},
+      {"coverage.surface_fraction", "surface covered", "1", kMore, true,
+       "share of the visible true surface samples that have a map point near"},
+      {"coverage.volume_m3", "free volume mapped", "m^3", kNeither, false,
+       "of the 3D map's free cells"},
+      {"coverage.t50_s", "time to 50 % of the area", "s", kLess, false,
+       "null: it never got so far"},
+      {"coverage.t90_s", "time to 90 % of the area", "s", kLess, false,
+       "null: it never got so far"},
+      {"coverage.t95_s", "time to 95 % of the area", "s", kLess, true, "null: it never got so far"},
+      {"coverage.revisit_ratio", "share of the path flown again", "1", kLess, false,
+       "path inside cells that were mapped, visited and left before; null without a path"},
+      {"coverage.heading_change_radpm", "heading change", "rad/m", kLess, false,
+       "sum of the course's changes over the path's length; null without a path"},
+      {"coverage.reachable_area_m2", "reachable area", "m^2", kNeither, false,
+       "what area_fraction is a share of"},
+      {"coverage.surface_samples", "visible surface samples", "", kNeither, false,
+       "what surface_fraction is a share of"},
+  };
+  for (const std::string_view name : worlds::kSurfaceClassNames) {
+    list.push_back({"coverage.surface_fraction_by_class." + std::string(name),
+                    "surface covered: " + std::string(name), "1", kMore, false,
+                    "of the samples of this class; null if none can be seen"});
+  }
+  return list;
+}
+
+std::vector<FigureInfo> exploration_figures() {
+  return {
+      {"exploration.decisions", "decisions of the explorer", "", kNeither, false,
+       "of explorations; null if it was never asked"},
+      {"exploration.targets", "targets issued", "", kNeither, false,
+       "the same as targets_issued, its older name"},
+      {"exploration.targets_issued", "targets issued", "", kNeither, false,
+       "by the explorer: decisions for a new one"},
+      {"exploration.targets_seen", "targets seen on the way", "", kNeither, false,
+       "dropped because their unknown area became known from afar"},
+      {"exploration.targets_reached", "targets reached", "", kNeither, false,
+       "that the vehicle flew to; target_reached in events.csv while it explores"},
+      {"exploration.targets_given_up", "targets given up", "", kLess, false,
+       "that proved unreachable or were cut off; reaching one at the moment it is seen counts in "
+       "both"},
+      {"exploration.exhaustive", "targets of the exhaustive search", "", kNeither, false,
+       "of the issued, those that the trees did not have"},
+      {"exploration.stop", "why the exploration stopped", "", kNeither, true,
+       "null: it did not stop by itself", Kind::kText},
+      {"exploration.open_frontier_m2", "largest frontier left", "m^2", kLess, false,
+       "unknown area at the largest frontier that the exhaustive search still reaches at the "
+       "stop; null unless it stopped for want of candidates"},
+  };
+}
+
+std::vector<FigureInfo> map_figures() {
+  return {
+      {"map.points", "map points", "", kNeither, false, "of the global point cloud"},
+      {"map.median_m", "map error, median", "m", kLess, true,
+       "distance of a map point from the nearest true surface, placed by the best fit of the "
+       "trajectory"},
+      {"map.p95_m", "map error, 95th percentile", "m", kLess, false, "of the same distances"},
+      {"map.outlier_fraction", "map outliers", "1", kLess, false,
+       "share of the points further off than scoring.map.outlier_m"},
+      {"map.scored", "map points scored", "", kNeither, false, "that were measured"},
+      {"map.foliage", "map points on foliage", "", kNeither, false, "left out of the score"},
+  };
+}
+
+std::vector<FigureInfo> odometry_figures() {
+  return {
+      {"odometry.source", "odometry", "", kNeither, false, "the source that flew", Kind::kText},
+      {"odometry.ate_rmse_m", "odometry error, RMS", "m", kLess, true,
+       "absolute position error, aligned at the first pose; null if there never was an "
+       "estimate"},
+      {"odometry.ate_max_m", "odometry error, largest", "m", kLess, false, "of the same"},
+      {"odometry.ate_se3_rmse_m", "odometry error, RMS, best fit", "m", kLess, false,
+       "after the best rigid alignment of the whole run"},
+      {"odometry.yaw_error_max_deg", "heading error, largest", "deg", kLess, false,
+       "aligned at the first pose"},
+      {"odometry.start_tilt_deg", "tilt of the odometry's frame", "deg", kLess, false,
+       "between its z axis and the vertical, at the start"},
+      {"odometry.rpe_1m_m", "relative error over 1 m", "m", kLess, false,
+       "RMS over all parts of the path of that length; null if it is shorter"},
+      {"odometry.rpe_10m_m", "relative error over 10 m", "m", kLess, false,
+       "RMS over all parts of the path of that length; null if it is shorter"},
+      {"odometry.lost_s", "time without odometry", "s", kLess, false,
+       "status lost; null if there never was an estimate"},
+  };
+}
+
+std::vector<FigureInfo> flight_figures() {
+  return {
+      {"planner.replans", "plans", "", kNeither, false, "of missions that are planned"},
+      {"planner.median_ms", "planning time, median", "ms", kLess, false, "of the host",
+       Kind::kNumber, true},
+      {"planner.p99_ms", "planning time, 99th percentile", "ms", kLess, false, "of the host",
+       Kind::kNumber, true},
+      {"planner.failures", "plans failed", "", kLess, true, "that found no way"},
+      {"tracking.rmse_m", "tracking error, RMS", "m", kLess, true,
+       "true position against the setpoint from take-off until it begins to land; null if it "
+       "never flew"},
+      {"tracking.landing_error_m", "landing error", "m", kLess, false,
+       "horizontal, resting place against the last target reached; null unless it landed "
+       "there"},
+      {"clearance.min_m", "least clearance", "m", kMore, true,
+       "airframe to the nearest surface on the way, leaves left out; 5 m stand for 5 m and "
+       "more"},
+      {"clearance.p05_m", "clearance, 5th percentile", "m", kMore, false, "of the same, at 20 Hz"},
+      {"thin.branches", "thin branches passed", "", kNeither, false,
+       "within scoring.thin.corridor_m; worlds that have some"},
+      {"thin.seen_in_time", "thin branches seen in time", "", kNeither, false,
+       "an occupied cell showed them before the vehicle was within its stopping distance"},
+      {"thin.seen_in_time_fraction", "share of thin branches seen in time", "1", kMore, false,
+       "of those passed"},
+      {"thin.in_grid_fraction", "share of thin branches still in the grid", "1", kMore, false,
+       "at that moment"},
+      {"collisions", "collisions", "", kLess, true, "with anything solid; the first ends the run"},
+      {"battery.used_wh", "battery used", "Wh", kLess, true, "drawn from it"},
+      {"battery.remaining_fraction", "battery left", "1", kMore, true,
+       "true state of charge at the end"},
+      {"renderer", "renderer of the depth frames", "", kNeither, false, "null: no frame was read",
+       Kind::kText},
+      {"build.version", "build", "", kNeither, false, "version and commit", Kind::kText},
+      {"build.compiler", "compiler", "", kNeither, false, "and its version", Kind::kText},
+  };
+}
+
+// Each: file, column, unit, meaning.
+
+std::vector<ColumnInfo> flight_columns() {
+  return {
+      {"summary.json: targets", "x", "m",
+       "of the target, in O: origin where it stood at start-up, z up"},
+      {"summary.json: targets", "y", "m", "likewise"},
+      {"summary.json: targets", "z", "m", "likewise"},
+      {"summary.json: targets", "time_s", "s", "when the mission said that it is there"},
+      {"summary.json: targets", "miss_m", "m", "true distance from it at that moment"},
+      {"truth.tum", "time_s", "s", "since the start of the run"},
+      {"truth.tum", "x_m", "m", "position of the vehicle in O"},
+      {"truth.tum", "y_m", "m", "likewise"},
+      {"truth.tum", "z_m", "m", "likewise"},
+      {"truth.tum", "qx", "", "attitude of the vehicle in O, a unit quaternion"},
+      {"truth.tum", "qy", "", "likewise"},
+      {"truth.tum", "qz", "", "likewise"},
+      {"truth.tum", "qw", "", "its real part"},
+      {"estimate.tum", "time_s", "s", "since the start of the run"},
+      {"estimate.tum", "x_m", "m", "position of the vehicle in O"},
+      {"estimate.tum", "y_m", "m", "likewise"},
+      {"estimate.tum", "z_m", "m", "likewise"},
+      {"estimate.tum", "qx", "", "attitude of the vehicle in O, a unit quaternion"},
+      {"estimate.tum", "qy", "", "likewise"},
+      {"estimate.tum", "qz", "", "likewise"},
+      {"estimate.tum", "qw", "", "its real part"},
+      {"events.csv", "time_s", "s", "when it happened"},
+      {"events.csv", "kind", "", "what happened"},
+      {"events.csv", "detail", "", "more of it; places are x y z in O, m"},
+      {"flight.csv", "time_s", "s", "rows at 20 Hz"},
+      {"flight.csv", "speed_mps", "m/s", "true"},
+      {"flight.csv", "tracking_error_m", "m",
+       "true position against the setpoint; empty on the ground, while landing and while lost"},
+      {"flight.csv", "odometry_error_m", "m",
+       "estimated against true position, aligned at the start"},
+      {"flight.csv", "odometry_yaw_error_rad", "rad", "the same of the heading"},
+      {"flight.csv", "clearance_m", "m",
+       "airframe to the nearest surface; empty where it is not on the way; 5 m stand for 5 m and "
+       "more"},
+      {"flight.csv", "height_m", "m", "true, above the start"},
+      {"flight.csv", "battery_voltage_v", "V", "at its terminals"},
+      {"flight.csv", "battery_power_w", "W", "drawn"},
+      {"flight.csv", "battery_fraction", "1", "true state of charge"},
+  };
+}
+
+std::vector<ColumnInfo> map_and_decision_columns() {
+  return {
+      {"decisions.csv", "time_s", "s", "of the decision"},
+      {"decisions.csv", "decision", "", "its number"},
+      {"decisions.csv", "kind", "", "new_target, keep_target, stop or wait"},
+      {"decisions.csv", "source", "",
+       "where its candidates come from: trees, exhaustive or forgiving"},
+      {"decisions.csv", "previous_end", "", "how the target before it ended"},
+      {"decisions.csv", "stop_reason", "", "why it stops, or none"},
+      {"decisions.csv", "candidate", "", "number of the candidate; a row each"},
+      {"decisions.csv", "winner", "", "1: it is flown to"},
+      {"decisions.csv", "x_m", "m", "of the frontier point in O"},
+      {"decisions.csv", "y_m", "m", "likewise"},
+      {"decisions.csv", "verdict", "", "kept, or why not"},
+      {"decisions.csv", "information_m2", "m^2", "unknown area to be seen there, f_I"},
+      {"decisions.csv", "distance_m", "m",
+       "way to it, f_N; empty: dropped before it was worked out"},
+      {"decisions.csv", "angle_rad", "rad",
+       "off the direction of exploration, A; empty: there is none"},
+      {"decisions.csv", "direction", "", "its term in the revenue; empty: dropped before"},
+      {"decisions.csv", "revenue", "",
+       "what the candidates are compared by; empty: dropped before"},
+      {"coverage.csv", "time_s", "s", "of the score"},
+      {"coverage.csv", "distance_m", "m", "flown so far"},
+      {"coverage.csv", "area_fraction", "1", "of the reachable area, known to the 2D map"},
+      {"coverage.csv", "surface_fraction", "1",
+       "of the visible surface samples, with a map point near"},
+      {"coverage.csv", "volume_m3", "m^3", "free, in the 3D map"},
+      {"timing.csv", "module", "", "what ran"},
+      {"timing.csv", "calls", "", "how often"},
+      {"timing.csv", "median_ms", "ms", "of the host, a call; empty without one"},
+      {"timing.csv", "p99_ms", "ms", "99th percentile of the same"},
+      {"timing.csv", "total_s", "s", "of the host, all calls"},
+      {"odometry_error.csv", "time_s", "s", "rows at 20 Hz"},
+      {"odometry_error.csv", "x_m", "m", "estimate minus truth in W, aligned at the first pose"},
+      {"odometry_error.csv", "y_m", "m", "likewise"},
+      {"odometry_error.csv", "z_m", "m", "likewise"},
+      {"odometry_error.csv", "roll_rad", "rad",
+       "rotation vector from the true to the estimated attitude, in W"},
+      {"odometry_error.csv", "pitch_rad", "rad", "likewise"},
+      {"odometry_error.csv", "yaw_rad", "rad", "likewise"},
+      {"cloud_growth.csv", "time_s", "s", "when it was counted"},
+      {"cloud_growth.csv", "points", "", "of cloud.pcd that were there by then: its first ones"},
+  };
+}
+
+std::vector<ColumnInfo> sweep_columns() {
+  return {
+      {"sweep.csv", "run", "", "folder of the run"},
+      {"sweep.csv", "scenario", "", "the base's name"},
+      {"sweep.csv", "variant", "", "its name in 'list'; only with one"},
+      {"sweep.csv", "KEY", "",
+       "value of each parameter that is varied; unit and meaning: arex params"},
+      {"sweep.csv", "seed", "", "of everything random"},
+      {"sweep.csv", "repeat", "", "number of the repetition; only with 'repeats'"},
+      {"sweep.csv", "failure", "", "why the run is not there; empty: it is"},
+      {"sweep.csv", "detail", "", "more of it"},
+      {"sweep.csv", "FIGURE", "", "every figure of the summary that is not a time of the host"},
+      {"sweep_host.csv", "run", "", "folder of the run"},
+      {"sweep_host.csv", "scenario", "", "the base's name"},
+      {"sweep_host.csv", "variant", "", "its name in 'list'; only with one"},
+      {"sweep_host.csv", "KEY", "",
+       "value of each parameter that is varied; unit and meaning: arex params"},
+      {"sweep_host.csv", "seed", "", "of everything random"},
+      {"sweep_host.csv", "repeat", "", "number of the repetition; only with 'repeats'"},
+      {"sweep_host.csv", "host", "", "where it was flown"},
+      {"sweep_host.csv", "attempt", "", "which try it was"},
+      {"sweep_host.csv", "wall_s", "s", "of the whole process"},
+      {"sweep_host.csv", "cpu_s", "s", "of the whole process"},
+      {"sweep_host.csv", "max_rss_mb", "MB", "most memory that it held"},
+      {"sweep_host.csv", "FIGURE", "", "the figures of the summary that are times of the host"},
+      {"log.csv", "time", "", "UTC"},
+      {"log.csv", "host", "", "where it happened"},
+      {"log.csv", "pid", "", "process of the supervisor"},
+      {"log.csv", "event", "", "what happened to a run"},
+      {"log.csv", "run", "", "its ID"},
+      {"log.csv", "attempt", "", "which try it was"},
+      {"log.csv", "detail", "", "more of it"},
+      {"arex pattern", "time_s", "s", "of the firing, since the first"},
+      {"arex pattern", "line", "", "of the four that fire together"},
+      {"arex pattern", "azimuth_deg", "deg", "of the beam, about the sensor's axis"},
+      {"arex pattern", "elevation_deg", "deg", "above the sensor's horizon"},
+  };
+}
+
+template <class T>
+std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
+  std::vector<T> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace
+
+const std::vector<FigureInfo>& figure_list() {
+  static const auto list =
+      joined<FigureInfo>({run_figures(), coverage_figures(), exploration_figures(), map_figures(),
+                          odometry_figures(), flight_figures()});
+  return list;
+}
+
+const std::vector<ColumnInfo>& column_list() {
+  static const auto list =
+      joined<ColumnInfo>({flight_columns(), map_and_decision_columns(), sweep_columns()});
+  return list;
+}
+
+}  // namespace arex::sim

@@ -1,0 +1,106 @@
+#include "run/summary.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "scoring/figures.h"
+
+namespace arex::sim {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::set<std::string> with_value(const ordered_json& summary) {
+  std::set<std::string> keys;
+  for (const auto& [key, text] : flatten(summary)) {
+    if (!text.empty()) keys.insert(key);
+  }
+  return keys;
+}
+
+// A run that never took off: counts are counts, everything else was not measured.
+TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
+  FlightResult result;
+  result.outcome = Outcome::kTimedOut;
+  result.reason = "no odometry";
+  const std::set<std::string> expected{
+      "outcome",         "reason",        "scenario",        "seed",
+      "sim_time_s",      "wall_time_s",   "cpu_time_s",      "real_time_factor",
+      "trajectory_hash", "sensor_hash",   "distance_m",      "targets.count",
+      "odometry.source", "collisions",    "battery.used_wh", "battery.remaining_fraction",
+      "build.version",   "build.compiler"};
+  result.trajectory_hash = result.sensor_hash = "0";
+  Scenario scenario;
+  scenario.name = "s";
+  EXPECT_EQ(with_value(summarise(scenario, result, {1, 1})), expected);
+
+  // Scorers that ran and found nothing to score.
+  result.map.emplace();
+  result.coverage.emplace();
+  result.flight.thin.emplace();
+  result.plans = 1;
+  result.timing = {summarise("replan", std::vector<float>())};
+  std::set<std::string> counts{"map.points",
+                               "map.scored",
+                               "map.foliage",
+                               "coverage.surface_samples",
+                               "coverage.reachable_area_m2",
+                               "thin.branches",
+                               "thin.seen_in_time",
+                               "planner.replans",
+                               "planner.failures"};
+  counts.insert(expected.begin(), expected.end());
+  EXPECT_EQ(with_value(summarise(scenario, result, {1, 1})), counts);
+}
+
+TEST(Summary, HasEveryFigureOfTheListAndNoOther) {
+  ordered_json summary = summarise({}, {}, {});
+  const auto sections = [&](std::string_view key) { return key.substr(0, key.find('.')); };
+  std::set<std::string_view> listed;
+  for (const FigureInfo& figure : figure_list()) listed.insert(sections(figure.key));
+  for (const auto& [key, value] : summary.items()) EXPECT_TRUE(listed.contains(key)) << key;
+  EXPECT_EQ(summary.size(), listed.size());
+}
+
+TEST(Summary, AModuleThatNeverRanHasNoTime) {
+  EXPECT_EQ(
+      timing_csv(
+          {summarise("depth", std::vector<float>()), summarise("imu", std::vector<float>{0.001F})}),
+      "module,calls,median_ms,p99_ms,total_s\ndepth,0,,,0.0000\nimu,1,1.0000,1.0000,0.0010\n");
+}
+
+TEST(ExplorationLog, CountsHowEachTargetEnded) {
+  ExplorationLog log;
+  const auto decide = [&](DecisionKind kind, TargetEnd end) {
+    Decision decision;
+    decision.kind = kind;
+    decision.previous_end = end;
+    log.add(decision);
+  };
+  Figures none;
+  log.add_figures(none);
+  EXPECT_TRUE(none.json()["exploration"].is_null());  // never asked
+
+  decide(DecisionKind::kNewTarget, TargetEnd::kNone);
+  decide(DecisionKind::kKeepTarget, TargetEnd::kNone);
+  decide(DecisionKind::kNewTarget, TargetEnd::kSeen);
+  decide(DecisionKind::kNewTarget, TargetEnd::kUnreachable);
+  decide(DecisionKind::kNewTarget, TargetEnd::kCutOff);
+  decide(DecisionKind::kStop, TargetEnd::kReached);
+  log.reached = 1;
+  Figures figures;
+  log.add_figures(figures);
+  const ordered_json exploration = figures.json()["exploration"];
+  EXPECT_EQ(exploration["decisions"], 6);
+  EXPECT_EQ(exploration["targets_issued"], 4);
+  EXPECT_EQ(exploration["targets"], 4);
+  EXPECT_EQ(exploration["targets_seen"], 1);
+  EXPECT_EQ(exploration["targets_given_up"], 2);
+  EXPECT_EQ(exploration["targets_reached"], 1);
+  EXPECT_TRUE(exploration["stop"].is_null());
+}
+
+}  // namespace
+}  // namespace arex::sim

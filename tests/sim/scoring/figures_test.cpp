@@ -1,0 +1,79 @@
+#include "scoring/figures.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "config/config.h"
+
+namespace arex::sim {
+namespace {
+
+using nlohmann::ordered_json;
+
+TEST(FigureList, SaysOfEveryFigureWhatItIs) {
+  std::set<std::string> keys;
+  for (const FigureInfo& figure : figure_list()) {
+    EXPECT_TRUE(keys.insert(figure.key).second) << figure.key << " stands twice";
+    EXPECT_FALSE(figure.label.empty()) << figure.key;
+    EXPECT_FALSE(figure.meaning.empty()) << figure.key;
+    EXPECT_EQ(find_figure(figure.column()), &figure);
+    // The unit is what the key's end says; only the words of a list or a text have none.
+    const std::string promised = config_detail::unit_of(figure.key);
+    const bool of_class = figure.key.find("_by_class.") != std::string::npos;
+    EXPECT_EQ(figure.unit, of_class ? "1" : promised) << figure.key;
+  }
+  for (const ColumnInfo& column : column_list()) {
+    EXPECT_FALSE(column.meaning.empty()) << column.file << " " << column.name;
+    if (column.unit.empty()) continue;
+    const bool bare = column.name.find('_') == std::string::npos;  // x, y, z of a target
+    EXPECT_EQ(column.unit, bare ? "m" : config_detail::unit_of(column.name)) << column.name;
+  }
+  EXPECT_EQ(find_figure("coverage"), nullptr);
+  EXPECT_EQ(find_figure("targets"), nullptr);
+  ASSERT_NE(find_figure("targets.count"), nullptr);
+}
+
+TEST(Figures, WhatIsNotSetOrNoNumberIsNull) {
+  Figures figures;
+  figures.set("outcome", "succeeded");
+  figures.set("seed", std::uint64_t{18446744073709551615U});
+  figures.set("collisions", 0);
+  figures.set("coverage.t50_s", std::numeric_limits<double>::quiet_NaN());
+  figures.set("map.points", std::size_t{0});
+  figures.set("map.median_m", std::numeric_limits<double>::infinity());
+  figures.set("exploration.open_frontier_m2", std::optional<double>());
+  figures.set("targets", {{{"x", 1.0}, {"time_s", 2.00000049}}});
+  const ordered_json json = figures.json();
+  EXPECT_EQ(json["outcome"], "succeeded");
+  EXPECT_EQ(json["seed"].dump(), "18446744073709551615");
+  EXPECT_EQ(json["collisions"].dump(), "0");
+  EXPECT_TRUE(json["coverage"].is_null()) << "a section without a value";
+  EXPECT_EQ(json["map"]["points"], 0);
+  EXPECT_TRUE(json["map"]["median_m"].is_null());
+  EXPECT_TRUE(json["exploration"].is_null());
+  EXPECT_EQ(json["targets"].dump(), R"([{"x":1.0,"time_s":2.0}])");
+  EXPECT_TRUE(json["reason"].is_null());
+  EXPECT_EQ(json.begin().key(), "outcome");
+}
+
+TEST(Figures, OnlyWhatIsListedCanBeSet) {
+  Figures figures;
+  EXPECT_THROW(figures.set("coverage.area", 1.0), std::logic_error);
+  EXPECT_THROW(figures.set("targets", 1.0), std::logic_error);
+  EXPECT_THROW(figures.set("outcome.count", std::vector<Figures::Item>()), std::logic_error);
+}
+
+TEST(Csv, ACellWithoutAMeasurementIsEmpty) {
+  EXPECT_EQ(csv_number(1.23456, 3), "1.235");
+  EXPECT_EQ(csv_number(std::numeric_limits<double>::quiet_NaN(), 3), "");
+  EXPECT_EQ(csv_number(std::numeric_limits<double>::infinity(), 3), "");
+  EXPECT_EQ(csv_header("timing.csv"), "module,calls,median_ms,p99_ms,total_s\n");
+  EXPECT_THROW(csv_header("nothing.csv"), std::logic_error);
+}
+
+}  // namespace
+}  // namespace arex::sim

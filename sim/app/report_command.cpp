@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void report_run(const fs::path& folder) {
-  const bool finished = sim::write_run_report(folder);
+void report_run(const fs::path& folder, const std::string& title) {
+  const bool finished = sim::write_run_report(folder, title);
   std::printf("%s/report.html%s\n", folder.c_str(), finished ? "" : " (unfinished run)");
 }
 
@@ -24,8 +24,9 @@ void report_comparison(const std::vector<fs::path>& folders, const fs::path& dir
                        const std::string& title, bool with_runs) {
   const sim::ResultTable results = sim::read_results(folders);
   if (with_runs) {
-    for (const fs::path& run : results.folders) {
-      if (sim::is_run_folder(run)) report_run(run);
+    for (std::size_t i = 0; i < results.folders.size(); ++i) {
+      const fs::path& run = results.folders[i];
+      if (sim::is_run_folder(run)) report_run(run, sim::run_title(results, i));
     }
   }
   const fs::path file = directory / "report.html";
@@ -72,7 +73,7 @@ int report(const ReportArguments& arguments) {
     if (sim::is_sweep_folder(folder)) {
       report_comparison({folder}, folder, sweep_title(folder), arguments.runs);
     } else {
-      report_run(folder);
+      report_run(folder, sim::title_in_sweep(folder));
     }
   }
   if (folders.size() > 1) {

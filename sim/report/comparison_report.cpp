@@ -1,12 +1,15 @@
 #include "report/comparison_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "report/page.h"
 #include "report/payload.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 namespace {
@@ -16,13 +19,36 @@ using nlohmann::ordered_json;
 constexpr std::size_t kMaxCells = 250'000;  // of the page's table: about 3 MB
 constexpr std::size_t kMaxLinks = 12;       // to the runs of one cause
 
-// Kept when a table is too large to be kept whole.
-constexpr const char* kMainFigures[] = {
-    "outcome",         "reason",         "sim_time_s",          "distance_m",
-    "coverage.t95_s",  "collisions",     "coverage.t90_s",      "coverage.area_fraction",
-    "clearance.min_m", "map.median_m",   "odometry.ate_rmse_m", "coverage.surface_fraction",
-    "battery.used_wh", "map.p95_m",      "planner.failures",    "odometry.yaw_error_max_deg",
-    "tracking.rmse_m", "planner.p99_ms", "odometry.ate_max_m",  "odometry.lost_s"};
+// Columns of words, whatever digits stand in them: a seed read as a number loses its last ones.
+bool is_text(const std::string& column) {
+  const FigureInfo* figure = find_figure(column);
+  if (figure) return figure->kind == FigureInfo::Kind::kText || column == "seed";
+  return column == "scenario" || column == "variant" || column == "sweep" || column == "failure" ||
+         column == "detail" || column.ends_with(".seed");
+}
+
+ordered_json cell_json(const std::string& column, const std::string& cell) {
+  if (cell.empty()) return nullptr;
+  const auto number = is_text(column) ? std::nullopt : parse_number(cell);
+  return number ? ordered_json(*number) : ordered_json(cell);
+}
+
+// What scripts/report/src/payload.ts calls FigureInfo.
+ordered_json figures_json(const std::vector<std::string>& columns) {
+  ordered_json figures = ordered_json::object();
+  for (const std::string& column : columns) {
+    const FigureInfo* figure = find_figure(column);
+    if (!figure) continue;
+    const int better = figure->better == Better::kMore   ? 1
+                       : figure->better == Better::kLess ? -1
+                                                         : 0;
+    figures[column] = {{"label", figure->label},
+                       {"unit", figure->unit},
+                       {"better", better},
+                       {"main", figure->main}};
+  }
+  return figures;
+}
 
 std::string link_to(const std::filesystem::path& run, const std::filesystem::path& directory) {
   if (!std::filesystem::exists(run)) return {};
@@ -50,7 +76,31 @@ std::string cause_of(const Table& table, std::size_t row) {
   const std::string failure = table.text(row, "failure");
   if (!failure.empty()) return failure;
   const std::string outcome = table.text(row, "outcome");
+  if (outcome.empty()) return "without outcome";
   return outcome == "succeeded" ? "" : outcome;
+}
+
+// What was not flown to an end of its own is neither a success nor a failure; as in results.ts.
+bool was_flown(const std::string& cause) {
+  return cause != "missing" && cause != "refused" && cause != "unfinished" &&
+         cause != "interrupted";
+}
+
+// How many of how many, with Wilson's 95 % interval of the share; of fewer than three runs it would
+// say next to nothing.
+std::string share_text(std::size_t part, std::size_t whole) {
+  if (whole == 0) return "none was flown";
+  const std::string counted = "of " + std::to_string(whole) + " flown";
+  if (whole < 3) return counted;
+  constexpr double kZ = 1.95996;
+  const auto n = static_cast<double>(whole);
+  const double p = static_cast<double>(part) / n;
+  const double scale = 1 / (1 + kZ * kZ / n);
+  const double middle = scale * (p + kZ * kZ / (2 * n));
+  const double half = scale * kZ * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
+  const auto percent = [](double share) { return number_text(std::round(100 * share)); };
+  return counted + ": " + percent_text(p) + ", 95 % interval " + percent(middle - half) + " to " +
+         percent(middle + half) + " %";
 }
 
 std::string failures_html(const ResultTable& results, const std::filesystem::path& directory) {
@@ -64,6 +114,7 @@ std::string failures_html(const ResultTable& results, const std::filesystem::pat
     causes[cause][detail.empty() ? table.text(i, "reason") : detail].push_back(i);
   }
   std::string html = "<section>\n<h2>Failures by cause</h2>\n";
+  if (table.rows.empty()) return html + "<p>No run was flown.</p>\n</section>\n";
   if (causes.empty()) return html + "<p>None: every run succeeded.</p>\n</section>\n";
   html +=
       "<div class=\"scroll\"><table class=\"data\">\n<thead><tr><th class=\"word\">cause</th>"
@@ -77,11 +128,11 @@ std::string failures_html(const ResultTable& results, const std::filesystem::pat
       for (std::size_t i = 0; i < std::min(rows.size(), kMaxLinks); ++i) {
         const std::filesystem::path& folder = results.folders[rows[i]];
         const std::string link = link_to(folder, directory);
-        const std::string name = escape_markup(folder.filename().string());
-        html +=
-            link.empty() ? name + " " : "<a href=\"" + escape_markup(link) + "\">" + name + "</a> ";
+        const std::string name = escape_markup(run_title(results, rows[i]));
+        html += i > 0 ? "; " : "";
+        html += link.empty() ? name : "<a href=\"" + escape_markup(link) + "\">" + name + "</a>";
       }
-      if (rows.size() > kMaxLinks) html += "…";
+      if (rows.size() > kMaxLinks) html += "; …";
       html += "</td></tr>\n";
     }
   }
@@ -95,13 +146,16 @@ std::string header_html(const ResultTable& results, const std::string& title) {
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     const std::string cause = cause_of(table, i);
     ++counts[cause.empty() ? "succeeded" : cause];
-    seeds.insert(table.text(i, "seed"));
+    if (const std::string seed = table.text(i, "seed"); !seed.empty()) seeds.insert(seed);
   }
   std::vector<KeyFigure> figures{{"Runs", std::to_string(table.rows.size()), ""},
                                  {"Seeds", std::to_string(seeds.size()), ""}};
-  for (const auto& [cause, count] : counts) {
-    figures.push_back({cause, std::to_string(count), ""});
-  }
+  const std::size_t successes = counts["succeeded"];
+  counts.erase("succeeded");
+  std::size_t flown = successes;
+  for (const auto& [cause, count] : counts) flown += was_flown(cause) ? count : 0;
+  figures.push_back({"succeeded", std::to_string(successes), share_text(successes, flown)});
+  for (const auto& [cause, count] : counts) figures.push_back({cause, std::to_string(count), ""});
   std::string html = "<h1>" + escape_markup(title) + "</h1>\n";
   std::string varied;
   for (const std::string& key : results.keys) {
@@ -125,11 +179,11 @@ ordered_json comparison_payload(const ResultTable& results,
   const bool whole = table.columns.size() * table.rows.size() <= kMaxCells;
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
     const bool is_key = i < results.keys.size() + 2;  // seed and failure as well
-    const bool is_main = std::find(std::begin(kMainFigures), std::end(kMainFigures),
-                                   table.columns[i]) != std::end(kMainFigures);
+    const FigureInfo* figure = find_figure(table.columns[i]);
+    const bool is_main = figure && figure->main;
     if (whole || is_key || is_main) columns.push_back(i);
   }
-  ordered_json names = ordered_json::array();
+  std::vector<std::string> names;
   for (const std::size_t column : columns) names.push_back(table.columns[column]);
   ordered_json rows = ordered_json::array();
   ordered_json links = ordered_json::array();
@@ -137,23 +191,16 @@ ordered_json comparison_payload(const ResultTable& results,
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     ordered_json row = ordered_json::array();
     for (const std::size_t column : columns) {
-      const std::string& cell = table.rows[i][column];
-      // A seed is a name: JavaScript's numbers would round the large ones.
-      const auto number = table.columns[column] == "seed" ? std::nullopt : parse_number(cell);
-      if (number) {
-        row.push_back(*number);
-      } else if (cell.empty()) {
-        row.push_back(nullptr);
-      } else {
-        row.push_back(cell);
-      }
+      row.push_back(cell_json(table.columns[column], table.rows[i][column]));
     }
     rows.push_back(std::move(row));
     runs.push_back(results.folders[i].filename().string());
     links.push_back(link_to(results.folders[i], directory));
   }
-  return {{"kind", "sweep"}, {"keys", results.keys}, {"columns", names},
-          {"rows", rows},    {"runs", runs},         {"links", links}};
+  return {{"kind", "sweep"},      {"figures", figures_json(names)},
+          {"keys", results.keys}, {"columns", names},
+          {"rows", rows},         {"runs", runs},
+          {"links", links}};
 }
 
 std::string comparison_report_html(const ResultTable& results, const std::string& title,

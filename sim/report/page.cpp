@@ -42,6 +42,11 @@ std::string number_text(double value, int digits) {
   return text.data();
 }
 
+std::string percent_text(double share) {
+  if (share < 1 && share > 0.9995) return "> 99.9 %";
+  return number_text(100 * share) + " %";
+}
+
 void write_page(const std::filesystem::path& file, const std::string& html) {
   const std::filesystem::path part = file.string() + ".partial";
   {

@@ -23,6 +23,9 @@ std::string key_figures_html(const std::vector<KeyFigure>& figures);
 /// Shortest text of a number with so many significant digits.
 std::string number_text(double value, int digits = 3);
 
+/// A share in percent. What is not the whole is never rounded to 100 %.
+std::string percent_text(double share);
+
 /// Replaces the file atomically. @throws std::runtime_error naming it when the disk refuses.
 void write_page(const std::filesystem::path& file, const std::string& html);
 

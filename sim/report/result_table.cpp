@@ -206,4 +206,33 @@ ResultTable read_results(const std::vector<std::filesystem::path>& folders) {
   return results;
 }
 
+std::string run_title(const ResultTable& results, std::size_t row) {
+  const Table& table = results.table;
+  std::string title;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    if (!title.empty()) title += ", ";
+    title += name + " " + value;
+  };
+  for (const std::string& key : results.keys) {
+    const std::string value = table.text(row, key);
+    bool varies = false;
+    for (std::size_t i = 0; i < table.rows.size() && !varies; ++i) {
+      varies = table.text(i, key) != value;
+    }
+    if (varies) add(key.substr(key.rfind('.') + 1), value.empty() ? "–" : value);
+  }
+  const std::string seed = table.text(row, "seed");
+  if (!seed.empty()) add("seed", seed);
+  return title.empty() ? results.folders[row].filename().string() : title;
+}
+
+std::string title_in_sweep(const std::filesystem::path& run_folder) {
+  const std::filesystem::path sweep = run_folder.parent_path().parent_path();
+  if (!std::filesystem::exists(sweep / "sweep.csv")) return {};
+  const ResultTable results = read_results({sweep});
+  const auto found = std::find(results.folders.begin(), results.folders.end(), run_folder);
+  if (found == results.folders.end()) return {};
+  return run_title(results, static_cast<std::size_t>(found - results.folders.begin()));
+}
+
 }  // namespace arex::sim

@@ -17,6 +17,12 @@ struct ResultTable {
   std::vector<std::filesystem::path> folders;  ///< of each row
 };
 
+/// What tells a run from the others: the values of the keys that vary, and its seed.
+std::string run_title(const ResultTable& results, std::size_t row);
+
+/// The same of a run folder inside a sweep that has ended; empty for any other folder.
+std::string title_in_sweep(const std::filesystem::path& run_folder);
+
 /// Whether a folder holds a sweep, finished or not.
 bool is_sweep_folder(const std::filesystem::path& folder);
 

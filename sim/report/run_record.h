@@ -44,6 +44,7 @@ std::optional<RecordedMap> read_map(const std::filesystem::path& folder);
 
 struct RunRecord {
   std::filesystem::path folder;
+  std::string title;  ///< what tells it from the other runs of its sweep; may be empty
   std::optional<nlohmann::ordered_json> summary;  ///< nothing: the run is unfinished
   std::string resolved_yaml;
   std::vector<StampedPose> truth;     ///< X_OB, 200 Hz

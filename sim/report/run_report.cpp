@@ -9,6 +9,7 @@
 #include "report/map_picture.h"
 #include "report/page.h"
 #include "report/payload.h"
+#include "scoring/figures.h"
 
 namespace arex::sim {
 namespace {
@@ -23,73 +24,83 @@ class Summary {
  public:
   explicit Summary(ordered_json json) : json_(std::move(json)) {}
 
-  [[nodiscard]] std::optional<double> number(const char* pointer) const {
-    const auto* value = find(pointer);
-    return value && value->is_number() ? std::optional(value->get<double>()) : std::nullopt;
-  }
-  [[nodiscard]] std::string text(const char* pointer) const {
-    const auto* value = find(pointer);
-    if (!value) return {};
+  [[nodiscard]] std::string text(const std::string& key) const {
+    const ordered_json* value = find(key);
+    if (!value || value->is_null()) return {};
     return value->is_string() ? value->get<std::string>() : value->dump();
+  }
+  /// A figure as people read it; empty if it has no value.
+  [[nodiscard]] std::string shown(const FigureInfo& figure) const {
+    const ordered_json* value = find(figure.key);
+    if (!value || value->is_null()) return {};
+    if (value->is_array()) return std::to_string(value->size());
+    return value->is_number_float() ? number_with_unit(value->get<double>(), figure.unit)
+                                    : with_unit(text(figure.key), figure.unit);
   }
 
  private:
-  [[nodiscard]] const ordered_json* find(const char* pointer) const {
+  static std::string with_unit(const std::string& number, const std::string& unit) {
+    return unit.empty() ? number : number + " " + unit;
+  }
+  static std::string number_with_unit(double value, const std::string& unit) {
+    if (unit == "1") return percent_text(value);
+    if (unit == "m" && std::abs(value) < 0.1) return number_text(1000 * value, 3) + " mm";
+    if (unit == "s") return number_text(std::round(10 * value) / 10, 9) + " s";
+    // Three digits, but all of those before the point.
+    const bool large = std::abs(value) >= 1000;
+    return with_unit(large ? number_text(std::round(value), 15) : number_text(value, 3), unit);
+  }
+  [[nodiscard]] const ordered_json* find(const std::string& key) const {
+    std::string pointer = "/" + key;
+    std::replace(pointer.begin(), pointer.end(), '.', '/');
     const ordered_json::json_pointer path(pointer);
     return json_.contains(path) ? &json_.at(path) : nullptr;
   }
   ordered_json json_;
 };
 
-std::string percent(double fraction) { return number_text(100 * fraction, 3) + " %"; }
-std::string metres(double value) { return number_text(value, 3) + " m"; }
-std::string millimetres(double value) { return number_text(1000 * value, 3) + " mm"; }
-std::string seconds(double value) { return number_text(std::round(10 * value) / 10, 5) + " s"; }
-
 std::vector<KeyFigure> key_figures(const Summary& summary) {
   std::vector<KeyFigure> figures;
-  const auto add = [&](const char* label, const char* pointer, auto text, std::string note = "") {
-    if (const auto value = summary.number(pointer)) {
-      figures.push_back({label, text(*value), std::move(note)});
-    }
-  };
-  const auto note = [&](const char* before, const char* pointer, auto text) {
-    const auto value = summary.number(pointer);
-    return value ? before + text(*value) : std::string();
-  };
-  const auto count = [](double value) { return number_text(value, 9); };
-  add("Flight time", "/sim_time_s", seconds,
-      note("host ", "/wall_time_s", seconds) + note(", ", "/real_time_factor", [](double v) {
-        return number_text(v) + " × real time";
-      }));
-  add("Distance", "/distance_m", metres);
-  add("Area covered", "/coverage/area_fraction", percent,
-      note("95 % after ", "/coverage/t95_s", seconds));
-  add("Surface covered", "/coverage/surface_fraction", percent);
-  add("Odometry error, RMS", "/odometry/ate_rmse_m", millimetres,
-      note("most ", "/odometry/ate_max_m", millimetres) +
-          note(", yaw ", "/odometry/yaw_error_max_deg",
-               [](double v) { return number_text(v, 2) + "°"; }));
-  add("Map error, median", "/map/median_m", millimetres,
-      note("95 % below ", "/map/p95_m", millimetres));
-  add("Least clearance", "/clearance/min_m", metres,
-      note("5 % below ", "/clearance/p05_m", metres));
-  add("Collisions", "/collisions", count);
-  add("Plans", "/planner/replans", count,
-      note("failed ", "/planner/failures", count) +
-          note(", p99 ", "/planner/p99_ms", [](double v) { return number_text(v) + " ms"; }));
-  add(
-      "Battery used", "/battery/used_wh", [](double v) { return number_text(v) + " Wh"; },
-      note("left ", "/battery/remaining_fraction", percent));
+  for (const FigureInfo& figure : figure_list()) {
+    const bool in_heading = figure.key == "outcome" || figure.key == "reason";
+    if (!figure.main || in_heading) continue;
+    const std::string value = summary.shown(figure);
+    if (!value.empty()) figures.push_back({figure.label, value, ""});
+  }
   return figures;
+}
+
+std::string every_figure_html(const Summary& summary) {
+  std::string html =
+      "<details id=\"every-figure\"><summary>Every figure</summary>\n<div class=\"scroll\">"
+      "<table class=\"data\">\n<thead><tr><th class=\"word\">figure</th><th>value</th>"
+      "<th class=\"word\">in summary.json</th><th class=\"text\">meaning</th></tr></thead>\n"
+      "<tbody>\n";
+  for (const FigureInfo& figure : figure_list()) {
+    const std::string value = summary.shown(figure);
+    html += "<tr><td class=\"word\">" + escape_markup(figure.label) + "</td><td>" +
+            (value.empty() ? "–" : escape_markup(value)) + "</td><td class=\"word\"><code>" +
+            escape_markup(figure.column()) + "</code></td><td class=\"text\">" +
+            escape_markup(figure.meaning) + "</td></tr>\n";
+  }
+  return html + "</tbody>\n</table></div></details>\n";
+}
+
+std::string name_of(const RunRecord& run) {
+  const Summary summary(run.summary ? *run.summary : ordered_json::object());
+  const std::string scenario = summary.text("scenario");
+  if (scenario.empty()) {
+    const std::filesystem::path& folder = run.folder;
+    return folder.has_filename() ? folder.filename().string()
+                                 : folder.parent_path().filename().string();
+  }
+  return scenario + (run.title.empty() ? ", seed " + summary.text("seed") : ": " + run.title);
 }
 
 std::string header_html(const RunRecord& run) {
   const Summary summary(run.summary ? *run.summary : ordered_json::object());
-  const std::string scenario = summary.text("/scenario");
-  const std::string outcome = run.summary ? summary.text("/outcome") : "unfinished";
-  const std::string name = scenario.empty() ? run.folder.filename().string()
-                                            : scenario + ", seed " + summary.text("/seed");
+  const std::string outcome = run.summary ? summary.text("outcome") : "unfinished";
+  const std::string name = name_of(run);
   std::string html = "<h1>" + escape_markup(name) + " <span class=\"badge " +
                      escape_markup(outcome) + "\">" + escape_markup(outcome) + "</span></h1>\n";
   if (!run.summary) {
@@ -98,12 +109,12 @@ std::string header_html(const RunRecord& run) {
         "What it recorded until then is shown.</p>\n";
     return html;
   }
-  html += "<p>" + escape_markup(summary.text("/reason"));
-  const std::string source = summary.text("/odometry/source");
+  html += "<p>" + escape_markup(summary.text("reason"));
+  const std::string source = summary.text("odometry.source");
   if (!source.empty()) html += ". Odometry: " + escape_markup(source);
-  const std::string hash = summary.text("/trajectory_hash");
+  const std::string hash = summary.text("trajectory_hash");
   if (!hash.empty()) html += ". Trajectory <code>" + escape_markup(hash) + "</code>";
-  const std::string version = summary.text("/build/version");
+  const std::string version = summary.text("build.version");
   if (!version.empty()) html += ", build " + escape_markup(version);
   html += "</p>\n";
   return html + key_figures_html(key_figures(summary));
@@ -215,6 +226,7 @@ std::string events_html(const Table& events) {
 std::string details_html(const RunRecord& run) {
   std::string html = "<section>\n<h2>In full</h2>\n";
   if (run.summary) {
+    html += every_figure_html(Summary(*run.summary));
     html += "<details><summary>summary.json</summary><pre>" + escape_markup(run.summary->dump(2)) +
             "</pre></details>\n";
   }
@@ -244,14 +256,12 @@ std::string run_report_html(const RunRecord& run) {
       "<div class=\"columns\">\n" + timing_html(run.timing) + events_html(run.events) + "</div>\n";
   html += decisions_html(run.decisions);
   html += details_html(run);
-  std::string name = run.folder.filename().string();
-  return report_page(
-      "AREX: " + (name.empty() ? run.folder.parent_path().filename().string() : name), html,
-      run_payload(run));
+  return report_page("AREX: " + name_of(run), html, run_payload(run));
 }
 
-bool write_run_report(const std::filesystem::path& folder) {
-  const RunRecord run = read_run(folder, kMaxReportPoints);
+bool write_run_report(const std::filesystem::path& folder, const std::string& title) {
+  RunRecord run = read_run(folder, kMaxReportPoints);
+  run.title = title;
   write_page(folder / "report.html", run_report_html(run));
   return run.summary.has_value();
 }

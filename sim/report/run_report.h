@@ -20,7 +20,8 @@ std::string run_report_html(const RunRecord& run);
 nlohmann::ordered_json run_payload(const RunRecord& run);
 
 /// Reads the run folder and writes its report.html. @return whether the run is a finished one.
+/// @param title of the run among others, see RunRecord
 /// @throws std::runtime_error naming what cannot be read or written.
-bool write_run_report(const std::filesystem::path& folder);
+bool write_run_report(const std::filesystem::path& folder, const std::string& title = "");
 
 }  // namespace arex::sim

@@ -28,7 +28,13 @@ std::vector<double> thinned(const std::vector<double>& values, Keep keep) {
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last =
         values.begin() + static_cast<std::ptrdiff_t>(std::min(begin + run, values.size()));
-    const auto order = [](double a, double b) { return std::abs(a) < std::abs(b); };
+    // What is missing is neither the least nor the greatest of those beside it.
+    const auto order = [keep](double a, double b) {
+      if (std::isnan(a) || std::isnan(b))
+        return keep == Keep::kLeast ? std::isnan(b) && !std::isnan(a)
+                                    : std::isnan(a) && !std::isnan(b);
+      return std::abs(a) < std::abs(b);
+    };
     switch (keep) {
       case Keep::kMiddle:
         kept.push_back(first[(last - first) / 2]);
@@ -56,15 +62,8 @@ ordered_json flight_json(const Table& flight) {
                                    {"height_m", Keep::kMiddle},
                                    {"battery_power_w", Keep::kMiddle},
                                    {"battery_fraction", Keep::kMiddle}}) {
-    std::vector<double> values = flight.numbers(name);
+    const std::vector<double> values = flight.numbers(name);
     if (values.empty()) continue;
-    if (name == std::string("clearance_m")) {
-      // Zero until it is first measured, on the way.
-      for (double& value : values) {
-        if (value != 0) break;
-        value = std::numeric_limits<double>::quiet_NaN();
-      }
-    }
     json[name] = quantised(thinned(values, keep));
   }
   return json;

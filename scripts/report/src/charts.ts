@@ -20,12 +20,20 @@ export interface Band {
   colour: string;
 }
 
+/** One value of its own. */
+export interface Dot {
+  x: number;
+  y: number;
+  colour: string;
+}
+
 export interface ChartSpec {
   title: string;
   xLabel: string;
   x: ArrayLike<number>;
   lines: Line[];
   bands?: Band[];
+  dots?: Dot[];
   /** Charts over the same axis share their cursor. */
   sync?: string;
   zero?: boolean;
@@ -143,9 +151,30 @@ function whiskerPlugin(bands: Band[]): uPlot.Plugin {
   };
 }
 
-function scaleRange(zero: boolean): uPlot.Range.Function {
-  return (_plot, min, max) => {
-    if (min === null || max === null) return [0, 1];
+function dotPlugin(dots: Dot[]): uPlot.Plugin {
+  return {
+    hooks: {
+      draw: (plot) => {
+        plot.ctx.save();
+        plot.ctx.lineWidth = 1.5 * devicePixelRatio;
+        for (const dot of dots) {
+          plot.ctx.strokeStyle = themeColour(dot.colour);
+          plot.ctx.beginPath();
+          plot.ctx.arc(plot.valToPos(dot.x, 'x', true), plot.valToPos(dot.y, 'y', true), 4 * devicePixelRatio, 0, 2 * Math.PI);
+          plot.ctx.stroke();
+        }
+        plot.ctx.restore();
+      },
+    },
+  };
+}
+
+/** @param dots values that are no series' and must be seen as well */
+function scaleRange(zero: boolean, dots: Dot[] = []): uPlot.Range.Function {
+  return (_plot, from, to) => {
+    if (from === null || to === null) return [0, 1];
+    const min = dots.reduce((least, dot) => Math.min(least, dot.y), from);
+    const max = dots.reduce((most, dot) => Math.max(most, dot.y), to);
     const room = 0.06 * (max - min || Math.abs(max) || 1);
     const low = zero && min >= 0 ? 0 : min - room;
     return [low, max + room];
@@ -202,7 +231,7 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
   }
   const x: uPlot.Scale = { time: false };
   if (spec.points) x.range = pointRange;
-  const scales: uPlot.Scales = { x, y: { range: scaleRange(spec.zero ?? true) } };
+  const scales: uPlot.Scales = { x, y: { range: scaleRange(spec.zero ?? true, spec.dots) } };
   if (right.length > 0) scales.right = { range: scaleRange(spec.zero ?? true) };
 
   const plot = new uPlot(
@@ -224,7 +253,7 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
         drag: { x: true, y: false },
         points: { size: 6 },
       },
-      plugins: spec.bands ? [whiskerPlugin(spec.bands)] : spec.sync === 'time' ? [markPlugin()] : [],
+      plugins: spec.bands ? [whiskerPlugin(spec.bands), dotPlugin(spec.dots ?? [])] : spec.sync === 'time' ? [markPlugin()] : [],
     },
     [gaps(spec.x), ...lines.map((line) => gaps(line.values))] as uPlot.AlignedData,
     box,

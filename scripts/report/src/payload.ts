@@ -68,11 +68,23 @@ export interface RunPayload {
 
 export type Cell = string | number | null;
 
+/** One of figure_list() in sim/scoring. */
+export interface FigureInfo {
+  label: string;
+  unit: string;
+  /** 1: more is better; -1: less is; 0: neither. */
+  better: number;
+  main: boolean;
+}
+
 export interface SweepPayload {
   kind: 'sweep';
+  /** What is known of the columns that are figures. */
+  figures: Record<string, FigureInfo>;
   /** What varies beside the seed, first in the columns. */
   keys: string[];
   columns: string[];
+  /** Seeds and hashes are texts, whatever their digits. */
   rows: Cell[][];
   runs: string[];
   /** Of each run's report or folder; empty if it is gone. */

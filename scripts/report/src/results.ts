@@ -1,27 +1,15 @@
 // The table of runs, as the views of a sweep ask for it.
 
-import { Cell, SweepPayload } from './payload';
+import { Cell, FigureInfo, SweepPayload } from './payload';
 import { Estimate, estimateMean, estimateShare } from './statistics';
 
-/** 1 if the run succeeded, 0 otherwise: the one figure that every run has. */
+/** 1 if the run succeeded, 0 otherwise: the one figure of all runs that were flown. */
 export const SUCCESS = 'succeeded';
 
-/** Figures of which more is better; of the others that are named, less. */
-const MORE_IS_BETTER = [
-  SUCCESS, 'coverage.area_fraction', 'coverage.surface_fraction', 'clearance.min_m', 'clearance.p05_m',
-  'battery.remaining_fraction', 'real_time_factor',
-];
-const LESS_IS_BETTER = [
-  'sim_time_s', 'distance_m', 'collisions', 'coverage.t50_s', 'coverage.t90_s', 'coverage.t95_s',
-  'coverage.revisit_ratio', 'map.median_m', 'map.p95_m', 'map.outlier_fraction', 'odometry.ate_rmse_m',
-  'odometry.ate_max_m', 'odometry.ate_se3_rmse_m', 'odometry.yaw_error_max_deg', 'odometry.rpe_1m_m',
-  'odometry.lost_s', 'planner.failures', 'planner.median_ms', 'planner.p99_ms', 'tracking.rmse_m',
-  'battery.used_wh',
-];
+const SUCCESS_INFO: FigureInfo = { label: 'succeeded', unit: '1', better: 1, main: true };
 
-export function betterSign(figure: string): number {
-  return MORE_IS_BETTER.includes(figure) ? 1 : LESS_IS_BETTER.includes(figure) ? -1 : 0;
-}
+/** What was not flown to an end of its own is neither a success nor a failure. */
+const NOT_FLOWN = ['missing', 'refused', 'unfinished', 'interrupted'];
 
 /** Numbers by value, and so what is text but all digits, as seeds are. */
 export function compare(a: Cell, b: Cell): number {
@@ -39,7 +27,7 @@ export class Results {
   private levelOf = new Map<string, Cell[]>();
   /** Keys with more than one value. */
   readonly factors: string[];
-  /** Columns that hold numbers which are not all the same, and success. */
+  /** Success, and the columns that hold numbers of runs that succeeded. */
   readonly figures: string[];
 
   constructor(readonly payload: SweepPayload) {
@@ -48,8 +36,8 @@ export class Results {
     const others = payload.columns.slice(payload.keys.length);
     const numeric = others.filter((name) => {
       if (name === 'seed' || name === 'repeat') return false;
-      const values = payload.rows.map((_row, i) => this.cell(i, name)).filter((cell) => cell !== null);
-      return values.length > 0 && values.every((cell) => typeof cell === 'number');
+      const cells = payload.rows.map((_row, i) => this.cell(i, name)).filter((cell) => cell !== null);
+      return cells.every((cell) => typeof cell === 'number') && payload.rows.some((_row, i) => this.value(i, name) !== null);
     });
     this.figures = [SUCCESS, ...numeric];
   }
@@ -58,10 +46,46 @@ export class Results {
     return this.payload.rows[row][this.payload.columns.indexOf(column)] ?? null;
   }
 
+  rows(): number[] {
+    return this.payload.rows.map((_row, i) => i);
+  }
+
+  succeeded(row: number): boolean {
+    return this.cell(row, 'outcome') === 'succeeded' && !this.cell(row, 'failure');
+  }
+
+  /** Whether the run says anything about success. */
+  private flown(row: number): boolean {
+    return ![this.cell(row, 'failure'), this.cell(row, 'outcome')].some((cell) => NOT_FLOWN.includes(String(cell)));
+  }
+
+  /** How many of the runs succeeded: those whose figures are compared. */
+  successes(rows: number[]): string {
+    return `${rows.filter((row) => this.succeeded(row)).length} of ${rows.length}`;
+  }
+
+  /** Null where the run has none; of a flight that failed no figure is comparable. */
   value(row: number, figure: string): number | null {
-    if (figure === SUCCESS) return this.cell(row, 'outcome') === 'succeeded' ? 1 : 0;
+    if (figure === SUCCESS) return this.flown(row) ? Number(this.succeeded(row)) : null;
     const cell = this.cell(row, figure);
-    return typeof cell === 'number' ? cell : null;
+    return typeof cell === 'number' && this.succeeded(row) ? cell : null;
+  }
+
+  info(figure: string): FigureInfo {
+    if (figure === SUCCESS) return SUCCESS_INFO;
+    return this.payload.figures[figure] ?? { label: figure, unit: '', better: 0, main: false };
+  }
+
+  /** By what a figure is multiplied to be shown in `unit`: shares are shown in percent. */
+  display(figure: string): { factor: number; unit: string } {
+    const { unit } = this.info(figure);
+    return unit === '1' ? { factor: 100, unit: '%' } : { factor: 1, unit };
+  }
+
+  /** In words, with its unit. */
+  title(figure: string): string {
+    const { unit } = this.display(figure);
+    return this.info(figure).label + (unit === '' ? '' : `, ${unit}`);
   }
 
   /** Each row's value of a key, or the middle of its range. */
@@ -92,8 +116,9 @@ export class Results {
   }
 
   estimate(rows: number[], figure: string): Estimate {
+    const { factor } = this.display(figure);
     const values = rows.map((i) => this.value(i, figure)).filter((value) => value !== null);
-    return figure === SUCCESS ? estimateShare(values) : estimateMean(values);
+    return figure === SUCCESS ? scaled(estimateShare(values), factor) : estimateMean(values.map((value) => factor * value));
   }
 
   /** Every combination of the factors' values that was flown. */
@@ -106,6 +131,11 @@ export class Results {
     });
     return [...found].map(([name, values]) => ({ name, values }));
   }
+}
+
+export function scaled(estimate: Estimate, factor: number): Estimate {
+  const { n, values, mean, low, high } = estimate;
+  return { n, values: values.map((value) => factor * value), mean: factor * mean, low: factor * low, high: factor * high };
 }
 
 /** The last part of a dotted key. */

@@ -1,23 +1,32 @@
 // A sweep, or runs side by side: curves, heat map, two configurations, the table.
 
-import { addChart, clearCharts } from './charts';
+import { Dot, addChart, clearCharts } from './charts';
 import { byId, element, onThemeChange, shown, themeColour } from './dom';
 import { Cell, SweepPayload } from './payload';
-import { Results, SUCCESS, betterSign, compare, shortKey } from './results';
-import { Estimate, estimateMean } from './statistics';
+import { Results, SUCCESS, compare, scaled, shortKey } from './results';
+import { Estimate, LEAST_FOR_INTERVAL, estimateMean, shareDifference } from './statistics';
 
 const LINE_COLOURS = 6; // --line-1 ... of the style sheet
 
-function choice(label: string, id: string, options: string[], chosen: string, change: (value: string) => void): HTMLLabelElement {
+type Choice = (label: string, id: string, options: string[], chosen: string, change: (value: string) => void,
+  name?: (option: string) => string) => HTMLLabelElement;
+const choice: Choice = (label, id, options, chosen, change, name = (option) => option) => {
   const select = element('select', { id, change: () => change(select.value) });
-  for (const option of options) select.append(element('option', { value: option, selected: option === chosen }, option));
+  for (const option of options) select.append(element('option', { value: option, selected: option === chosen }, name(option)));
   return element('label', {}, label, select);
+};
+
+/** The mean; of a few values, the values themselves. */
+function middle(estimate: Estimate): string {
+  if (estimate.n === 0) return '–';
+  return estimate.n < LEAST_FOR_INTERVAL && estimate.values.length > 0
+    ? estimate.values.map((value) => shown(value, 3)).join(', ')
+    : shown(estimate.mean, 3);
 }
 
 function interval(estimate: Estimate): string {
-  if (estimate.n === 0) return '–';
-  if (!Number.isFinite(estimate.low)) return shown(estimate.mean, 3);
-  return `${shown(estimate.mean, 3)} (${shown(estimate.low, 3)} … ${shown(estimate.high, 3)})`;
+  if (!Number.isFinite(estimate.low)) return middle(estimate);
+  return `${middle(estimate)} (${shown(estimate.low, 3)} … ${shown(estimate.high, 3)})`;
 }
 
 /** Blends two colours of the style sheet. */
@@ -53,7 +62,8 @@ class FigureView {
       this.draw();
     };
     const controls = element('div', { class: 'controls' });
-    controls.append(choice('figure', 'figure', figures, this.figure, set((v) => (this.figure = v))));
+    const title = (figure: string) => results.title(figure);
+    controls.append(choice('figure', 'figure', figures, this.figure, set((v) => (this.figure = v)), title));
     if (factors.length > 1) {
       controls.append(choice('across', 'across', factors, this.across, set((v) => (this.across = v))));
       controls.append(choice('by', 'by', ['', ...factors], this.by, set((v) => (this.by = v))));
@@ -61,8 +71,9 @@ class FigureView {
     section.append(element('h2', {}, 'Effect of what was varied'), controls,
       element('div', { class: 'columns' }, this.charts, this.heat));
     section.append(element('p', { class: 'note' },
-      'Means over seeds and over every key not chosen, with 95 % confidence intervals (Student; Wilson for ' +
-      'shares). Runs without the figure are left out; n says how many had it.'));
+      `Means over seeds and over every key not chosen, of the runs that succeeded (${results.successes(results.rows())}): ` +
+      'of a flight that failed no other figure is comparable. With 95 % confidence intervals (Student; Wilson for the ' +
+      `share that succeeded) from n = ${LEAST_FOR_INTERVAL} on; fewer values are shown as they are. n says how many runs had the figure.`));
     if (results.ranged.length > 0) {
       const text = `Of ${results.ranged.join(', ')} each value stands for the range around it.`;
       section.append(element('p', { class: 'note' }, text));
@@ -89,8 +100,10 @@ class FigureView {
     const numeric = levels.every((level) => typeof level === 'number');
     const x = numeric ? (levels as number[]) : levels.map((_level, i) => i);
     const groups: (Cell | undefined)[] = by && by !== across ? results.levels(by) : [undefined];
+    const { unit } = results.display(figure);
     const lines = [];
     const bands = [];
+    const dots: Dot[] = [];
     for (const [g, group] of groups.slice(0, LINE_COLOURS).entries()) {
       const estimates = levels.map((level) => {
         const values: Record<string, Cell> = { [across]: level };
@@ -100,21 +113,25 @@ class FigureView {
       const colour = `--line-${g + 1}`;
       const name = group === undefined ? 'mean' : `${shortKey(by)} ${group ?? '–'}`;
       const first = lines.length;
-      lines.push({ label: name, values: estimates.map((e) => e.mean), colour, unit: '' });
-      lines.push({ label: 'low', values: estimates.map((e) => e.low), colour, unit: '', edge: true });
-      lines.push({ label: 'high', values: estimates.map((e) => e.high), colour, unit: '', edge: true });
+      lines.push({ label: name, values: estimates.map((e) => e.mean), colour, unit });
+      lines.push({ label: 'low', values: estimates.map((e) => e.low), colour, unit, edge: true });
+      lines.push({ label: 'high', values: estimates.map((e) => e.high), colour, unit, edge: true });
       bands.push({ low: first + 1, high: first + 2, colour });
+      estimates.forEach((e, i) => {
+        if (e.n < LEAST_FOR_INTERVAL) dots.push(...e.values.map((y) => ({ x: x[i], y, colour })));
+      });
     }
     if (groups.length > LINE_COLOURS) {
       const text = `The first ${LINE_COLOURS} of ${groups.length} values of ${by} are drawn; the heat map has all.`;
       this.charts.append(element('p', { class: 'note' }, text));
     }
     addChart(this.charts, {
-      title: `${figure} over ${across}`,
+      title: `${results.title(figure)} over ${across}`,
       xLabel: across,
       x,
       lines,
       bands,
+      dots,
       points: true,
       zero: false,
       height: 300,
@@ -133,8 +150,7 @@ class FigureView {
       columns.map((column) => results.estimate(results.where({ [across]: column, [by]: row }), figure)),
     );
     const means = cells.flat().filter((e) => e.n > 0).map((e) => e.mean);
-    const low = Math.min(...means);
-    const high = Math.max(...means);
+    const scale = { low: Math.min(...means), high: Math.max(...means) };
     const table = element('table', { class: 'heat' });
     const head = element('tr', {}, element('th', {}, `${shortKey(by)} \\ ${shortKey(across)}`));
     for (const column of columns) head.append(element('th', {}, String(column ?? '–')));
@@ -142,20 +158,22 @@ class FigureView {
     const body = element('tbody');
     rows.forEach((row, r) => {
       const line = element('tr', {}, element('th', {}, String(row ?? '–')));
-      for (const estimate of cells[r]) line.append(heatCell(estimate, low, high));
+      for (const estimate of cells[r]) line.append(heatCell(estimate, scale));
       body.append(line);
     });
     table.append(body);
-    this.heat.append(element('h3', {}, `${figure}, mean`), table);
+    this.heat.append(element('h3', {}, `${results.title(figure)}: mean`), table);
   }
 }
 
-function heatCell(estimate: Estimate, low: number, high: number): HTMLElement {
+/** Coloured between the lowest and the highest mean, where there are two to be compared. */
+function heatCell(estimate: Estimate, { low, high }: { low: number; high: number }): HTMLElement {
   if (estimate.n === 0) return element('td', {}, '–');
   const known = Number.isFinite(estimate.low) ? `${shown(estimate.low, 3)} … ${shown(estimate.high, 3)}, ` : '';
   const small = `${known}n ${estimate.n}`;
-  const cell = element('td', {}, shown(estimate.mean, 3), element('small', {}, small));
-  const share = high > low ? (estimate.mean - low) / (high - low) : 0.5;
+  const cell = element('td', {}, middle(estimate), element('small', {}, small));
+  if (!(high > low)) return cell;
+  const share = (estimate.mean - low) / (high - low);
   cell.style.background = blend('--heat-low', '--heat-high', share);
   cell.style.color = themeColour(share > 0.55 ? '--heat-text-high' : '--heat-text-low');
   return cell;
@@ -175,8 +193,9 @@ function sideBySide(results: Results, section: HTMLElement): void {
       const row = comparisonRow(results, figure, a, b);
       if (row) body.append(row);
     }
-    const head = element('tr', {}, element('th', { class: 'word' }, 'figure'), element('th', {}, 'A'), element('th', {}, 'B'),
-      element('th', {}, 'B − A, paired'));
+    const successes = (rows: number[]) => element('small', {}, ` ${results.successes(rows)} succeeded`);
+    const head = element('tr', {}, element('th', { class: 'word' }, 'figure'), element('th', {}, 'A', successes(a)),
+      element('th', {}, 'B', successes(b)), element('th', {}, 'B − A, paired'));
     box.replaceChildren(element('table', { class: 'data' }, element('thead', {}, head), body));
   };
   section.append(
@@ -186,35 +205,48 @@ function sideBySide(results: Results, section: HTMLElement): void {
       choice('B', 'side-b', names, chosen[1], (name) => ((chosen[1] = name), draw()))),
     box,
     element('p', { class: 'note' },
-      'Mean (95 % confidence interval). Differences are taken seed by seed where both flew it; one whose ' +
-      'interval leaves zero out is marked. Among many figures, one in twenty does so by chance.'),
+      `Mean (95 % confidence interval) of the runs that succeeded; fewer than ${LEAST_FOR_INTERVAL} values are shown as they ` +
+      'are and not judged. Differences are taken seed by seed where both succeeded; one whose interval leaves zero out is ' +
+      'marked. Among many figures, one in twenty does so by chance.'),
   );
   draw();
+}
+
+/** A row's seed and repetition where no other row of its side has them: what can be paired. */
+function partners(results: Results, figure: string, rows: number[]): Map<string, number> {
+  const identity = (row: number) => `${results.cell(row, 'seed')} ${results.cell(row, 'repeat')}`;
+  const count = new Map<string, number>();
+  for (const row of rows) count.set(identity(row), (count.get(identity(row)) ?? 0) + 1);
+  const found = new Map<string, number>();
+  for (const row of rows) {
+    const value = results.value(row, figure);
+    if (value !== null && count.get(identity(row)) === 1) found.set(identity(row), value);
+  }
+  return found;
+}
+
+function difference(results: Results, figure: string, a: number[], b: number[]): Estimate {
+  if (figure === SUCCESS) {
+    const [share_a, share_b] = [a, b].map((rows) => scaled(results.estimate(rows, figure), 1 / 100));
+    return scaled(shareDifference(share_a, share_b), 100);
+  }
+  const { factor } = results.display(figure);
+  const before = partners(results, figure, a);
+  const after = partners(results, figure, b);
+  return estimateMean([...after].flatMap(([id, value]) => (before.has(id) ? [factor * (value - before.get(id)!)] : [])));
 }
 
 function comparisonRow(results: Results, figure: string, a: number[], b: number[]): HTMLElement | null {
   const [of_a, of_b] = [results.estimate(a, figure), results.estimate(b, figure)];
   if (of_a.n === 0 && of_b.n === 0) return null;
-  const identity = (row: number) => `${results.cell(row, 'seed')} ${results.cell(row, 'repeat')}`;
-  const partners = new Map(a.map((row) => [identity(row), results.value(row, figure)]));
-  const differences = b.flatMap((row) => {
-    const [before, after] = [partners.get(identity(row)), results.value(row, figure)];
-    return before === null || before === undefined || after === null ? [] : [after - before];
-  });
-  const difference = estimateMean(differences);
-  const significant = difference.low > 0 || difference.high < 0;
-  const better = Math.sign(difference.mean) * betterSign(figure);
+  const change = difference(results, figure, a, b);
+  const significant = change.low > 0 || change.high < 0;
+  const better = Math.sign(change.mean) * results.info(figure).better;
   const mark = !significant ? '' : better > 0 ? 'better' : better < 0 ? 'worse' : 'differs';
-  const text = differences.length === 0 ? '–' : `${interval(difference)}, n ${difference.n}${mark ? ', ' + mark : ''}`;
-  return element('tr', {}, element('td', { class: 'word' }, figure), element('td', {}, interval(of_a)),
-    element('td', {}, interval(of_b)), element('td', { class: mark }, text));
+  const text = change.n === 0 ? '–' : `${interval(change)}, n ${change.n}${mark ? ', ' + mark : ''}`;
+  return element('tr', { 'data-figure': figure }, element('td', { class: 'word', title: figure }, results.title(figure)),
+    element('td', {}, interval(of_a)), element('td', {}, interval(of_b)), element('td', { class: mark }, text));
 }
-
-/** Columns that the table shows at first. */
-const TABLE_FIGURES = [
-  'sim_time_s', 'distance_m', 'coverage.area_fraction', 'coverage.t95_s', 'odometry.ate_rmse_m', 'clearance.min_m',
-  'collisions', 'battery.used_wh',
-];
 
 class RunTable {
   private all = false;
@@ -237,7 +269,10 @@ class RunTable {
   private columns(): string[] {
     const { columns, keys } = this.results.payload;
     if (this.all) return columns;
-    return [...keys, 'seed', 'failure', 'outcome', ...TABLE_FIGURES].filter((name) => columns.includes(name));
+    const { figures, rows } = this.results.payload;
+    const measured = (name: string) => rows.some((_row, i) => this.results.cell(i, name) !== null);
+    const main = Object.keys(figures).filter((name) => figures[name].main && measured(name));
+    return [...new Set([...keys, 'seed', 'failure', ...main])].filter((name) => columns.includes(name));
   }
 
   private order(): number[] {
@@ -259,7 +294,7 @@ class RunTable {
         this.sortedBy = name;
         this.draw();
       },
-    }, shortKey(name));
+    }, name in this.results.payload.figures ? this.results.title(name) : shortKey(name));
     const words = this.results.payload.rows.some((_row, i) => typeof this.results.cell(i, name) === 'string');
     const cell = element('th', { title: name, class: words ? 'word' : '' }, button);
     if (this.sortedBy === name) cell.setAttribute('aria-sort', this.direction > 0 ? 'ascending' : 'descending');
@@ -275,7 +310,8 @@ class RunTable {
       const line = element('tr', {}, element('td', { class: 'word' }, link));
       for (const name of columns) {
         const cell = this.results.cell(row, name);
-        line.append(typeof cell === 'number' ? element('td', {}, shown(cell)) : element('td', { class: 'word' }, cell ?? ''));
+        const { factor } = this.results.display(name);
+        line.append(typeof cell === 'number' ? element('td', {}, shown(factor * cell)) : element('td', { class: 'word' }, cell ?? ''));
       }
       body.append(line);
     }

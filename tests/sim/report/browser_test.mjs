@@ -139,8 +139,8 @@ async function testSweep(browser, width, dark) {
   // Success of four seeds at each of 3 x 2 points; the collision is seed 2 at (0.3, 3).
   await page.run(`(() => { const s = document.getElementById('figure'); s.value = 'succeeded';
     s.dispatchEvent(new Event('change')); })()`);
-  assert.match(await text('.heat tbody tr:nth-child(2) td:nth-of-type(1)'), /^0\.75/);
-  assert.match(await text('.heat tbody tr:nth-child(1) td:nth-of-type(1)'), /^1/);
+  assert.match(await text('.heat tbody tr:nth-child(2) td:nth-of-type(1)'), /^75/);
+  assert.match(await text('.heat tbody tr:nth-child(1) td:nth-of-type(1)'), /^100/);
   // The address names the view, and opens it again.
   const hash = await page.run('location.hash');
   assert.match(hash, /figure=succeeded/);
@@ -163,10 +163,45 @@ async function testSweep(browser, width, dark) {
   assert.equal(await page.run(`document.querySelectorAll('#run-table a[href^="./runs/"]').length`), 1);
 
   // More inflation takes longer here, by construction: 16 s, noise 5 s.
-  assert.match(await text('#side tbody'), /sim_time_s.*worse/);
+  assert.match(await text('#side tbody'), /flight time, s.*worse/);
   await keep(page, `sweep-${width}-${dark ? 'dark' : 'light'}`);
   await assertSound(page, width);
   await page.close();
+}
+
+/** Only what succeeded is compared, two values are no statistics, and seeds keep their digits. */
+async function testFailures(browser) {
+  const row = (page, figure) =>
+    page.run(`[...document.querySelectorAll('#side tr[data-figure="${figure}"] td')].map((td) => td.textContent)`);
+  const judged = (page) => page.run(`document.querySelectorAll('#side .better, #side .worse, #side .differs').length`);
+  const few = await browser.open(address('few'));
+  assert.match(await few.run(`document.querySelector('#side thead').textContent`), /A 4 of 4 succeeded.*B 2 of 4 succeeded/);
+  const distance = await row(few, 'distance_m');
+  assert.equal(distance[0], 'distance flown, m');
+  assert.match(distance[1], /^11\.5 \(.* … .*\)$/);
+  assert.equal(distance[2], '13, 14');
+  assert.equal(distance[3], '3, 3, n 2');
+  const left = await row(few, 'battery.remaining_fraction');
+  assert.equal(left[2], '50, 50', 'shares are in percent');
+  const success = await row(few, 'succeeded');
+  assert.match(success[1], /^100 \(51 … 100\)$/);
+  assert.match(success[2], /^50 \(15 … 85\)$/);
+  assert.equal(await judged(few), 0, 'two pairs are no difference');
+  const seeds = await few.run(`[...document.querySelectorAll('#run-table td')].map((td) => td.textContent)`);
+  for (const seed of ['18446744073709551612', '18446744073709551615']) assert.ok(seeds.includes(seed), seed);
+  assert.ok((await few.picture('.chart canvas')).share > 0.002);
+  await keep(few, 'few');
+  await assertSound(few, 1280);
+  await few.close();
+
+  const none = await browser.open(address('none'));
+  assert.match(await none.run(`document.querySelector('#side thead').textContent`), /A 0 of 4 succeeded.*B 0 of 4 succeeded/);
+  assert.deepEqual(await row(none, 'distance_m'), [], 'a figure of flights that failed is compared');
+  assert.equal(await judged(none), 0);
+  assert.match(await none.run(`document.body.innerText`), /succeeded\s+0\s+of 8 flown: 0 %, 95 % interval 0 to 32 %/);
+  await keep(none, 'none');
+  await assertSound(none, 1280);
+  await none.close();
 }
 
 /** Forty values of a key are drawn as eight ranges. */
@@ -190,13 +225,14 @@ try {
     await testRun(browser, width, dark);
     await testSweep(browser, width, dark);
   }
+  await testFailures(browser);
   await testHypercube(browser);
   await testPlay(browser);
   await testWithoutGrowth(browser);
   await testWithoutWebGl(browser);
   await testWithoutScript(browser);
   await testPaper(browser);
-  console.log('10 passed, 0 failed');
+  console.log('11 passed, 0 failed');
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

@@ -39,23 +39,65 @@ TEST(ComparisonReport, NamesFailuresByTheirCause) {
   const std::string html =
       comparison_report_html(read_results({folder.path()}), "sweep <x>", folder.path());
   EXPECT_TRUE(contains(html, "<h1>sweep &lt;x&gt;</h1>"));
-  EXPECT_TRUE(contains(html, "<dt>succeeded</dt><dd>22</dd>"));
+  EXPECT_TRUE(contains(html,
+                       "<dt>succeeded</dt><dd>22<small>of 24 flown: 91.7 %, 95 % "
+                       "interval 74 to 98 %</small></dd>"));
   EXPECT_TRUE(contains(html, "<dt>crashed</dt><dd>1</dd>"));
   EXPECT_TRUE(contains(html, "<td class=\"text\">signal 11, &lt;core&gt;</td>"));
   EXPECT_TRUE(contains(html, "<td class=\"text\">hit trunk 4 at 1.20 m/s</td>"));
 }
 
-TEST(ComparisonReport, SeedsStayTheDigitsThatTheyAre) {
+TEST(ComparisonReport, TitlesARunByWhatWasVaried) {
   const TemporaryFolder folder;
-  write_text(folder / "sweep.csv",
-             "run,scenario,seed,failure,detail,outcome,distance_m\n"
-             "0,one,18446744073709551615,,,succeeded,3.5\n"
-             "1,one,9007199254740993,,,succeeded,4.5\n");
-  const auto payload = comparison_payload(read_results({folder.path()}), folder.path());
-  const std::vector<std::string> columns = payload["columns"];
-  const auto column = std::find(columns.begin(), columns.end(), "seed") - columns.begin();
-  EXPECT_EQ(payload["rows"][0][static_cast<std::size_t>(column)], "18446744073709551615");
-  EXPECT_EQ(payload["rows"][1][static_cast<std::size_t>(column)], "9007199254740993");
+  test::write_synthetic_sweep(folder.path());
+  const ResultTable results = read_results({folder.path()});
+  EXPECT_EQ(run_title(results, 0), "inflation_m 0.3, weight_direction 1, seed 1");
+  EXPECT_EQ(run_title(results, 23), "inflation_m 0.7, weight_direction 3, seed 4");
+  EXPECT_EQ(title_in_sweep(results.folders[0]), run_title(results, 0));
+  EXPECT_EQ(title_in_sweep(folder / "elsewhere/run"), "");
+  const std::string html = comparison_report_html(results, "sweep", folder.path());
+  EXPECT_TRUE(contains(html, "inflation_m 0.3, weight_direction 3, seed 2"));  // the collided one
+}
+
+ResultTable table_of(const std::string& csv) {
+  ResultTable results;
+  results.keys = {"scenario"};
+  results.table = parse_table(csv);
+  results.folders.assign(results.table.rows.size(), "nowhere/run");
+  return results;
+}
+
+TEST(ComparisonReport, DigitsOfSeedsAndHashesAreNoNumbers) {
+  const auto payload = comparison_payload(
+      table_of("scenario,seed,failure,detail,outcome,trajectory_hash,distance_m,map.points\n"
+               "007,18446744073709551615,,,succeeded,1234567890123456,12.5,3\n"
+               "1e3,9007199254740993,,,succeeded,12e4567890123456,,4\n"),
+      ".");
+  EXPECT_EQ(payload["rows"].dump(),
+            R"([["007","18446744073709551615",null,null,"succeeded","1234567890123456",12.5,3.0],)"
+            R"(["1e3","9007199254740993",null,null,"succeeded","12e4567890123456",null,4.0]])");
+  EXPECT_EQ(payload["figures"]["distance_m"].dump(),
+            R"({"label":"distance flown","unit":"m","better":-1,"main":true})");
+  EXPECT_FALSE(payload["figures"].contains("detail"));
+}
+
+TEST(ComparisonReport, OnlyAnOutcomeMakesASuccess) {
+  const auto html = [](const std::string& csv) {
+    return comparison_report_html(table_of(csv), "runs", ".");
+  };
+  const std::string mixed = html(
+      "scenario,seed,failure,detail,outcome,reason\n"
+      "a,1,,,succeeded,mission done\n"
+      "a,2,missing,,,\na,3,,,interrupted,signal\na,,unfinished,,,\n"
+      "a,4,,,,\n");
+  EXPECT_TRUE(contains(mixed, "<dt>succeeded</dt><dd>1<small>of 2 flown</small>")) << mixed;
+  EXPECT_TRUE(contains(mixed, "<dt>without outcome</dt><dd>1</dd>"));
+  EXPECT_TRUE(contains(mixed, "<dt>Seeds</dt><dd>4</dd>"));
+  const std::string none = html("scenario,seed,failure,detail,outcome\na,1,missing,,\n");
+  EXPECT_TRUE(contains(none, "<dt>succeeded</dt><dd>0<small>none was flown</small></dd>"));
+  const std::string empty = html("scenario,seed,failure,detail,outcome\n");
+  EXPECT_TRUE(contains(empty, "No run was flown"));
+  EXPECT_FALSE(contains(empty, "every run succeeded"));
 }
 
 TEST(ComparisonReport, LinksToTheRunsThatAreThere) {

@@ -1,5 +1,6 @@
 // Writes what the browser test opens: FOLDER/run, FOLDER/old (without the growth of its cloud) and
-// FOLDER/sweep and FOLDER/cube, each with its report.
+// FOLDER/sweep, FOLDER/cube, FOLDER/few (half of one side failed) and FOLDER/none (all did), each
+// with its report.
 
 #include <cstdio>
 #include <filesystem>
@@ -24,7 +25,9 @@ int main(int argc, char** argv) {
   }
   test::write_synthetic_sweep(folder / "sweep");
   test::write_synthetic_hypercube(folder / "cube");
-  for (const char* name : {"sweep", "cube"}) {
+  test::write_synthetic_failures(folder / "few", 2);
+  test::write_synthetic_failures(folder / "none", 0);
+  for (const char* name : {"sweep", "cube", "few", "none"}) {
     const std::filesystem::path sweep = folder / name;
     write_page(sweep / "report.html",
                comparison_report_html(read_results({sweep}), "Sweep", sweep));

@@ -8,6 +8,7 @@
 #include "quantised_reader.h"
 #include "report/map_picture.h"
 #include "report/targets.h"
+#include "scoring/figures.h"
 #include "support/temporary_folder.h"
 #include "synthetic_run.h"
 
@@ -39,6 +40,29 @@ TEST(RunReport, TellsOutcomeFiguresEventsAndTiming) {
   }
   EXPECT_FALSE(contains(html, "badge unfinished"));
   EXPECT_FALSE(contains(html, "Not in the run folder"));
+}
+
+TEST(RunReport, ShowsEveryFigureWithItsUnitAndWhatItMeans) {
+  const TemporaryFolder folder;
+  RunRecord run = recorded(folder);
+  const std::string html = run_report_html(run);
+  // The main ones at the top, in words and units; why it stopped among them.
+  EXPECT_TRUE(contains(html, "<dt>why the exploration stopped</dt><dd>little_left</dd>"));
+  EXPECT_TRUE(contains(html, "<dt>odometry error, RMS</dt><dd>20 mm</dd>"));
+  EXPECT_TRUE(contains(html, "<dt>distance flown</dt><dd>31.4 m</dd>"));
+  EXPECT_FALSE(contains(html, "<dt>time to 95 % of the area</dt>"));  // it never got so far
+  for (const FigureInfo& figure : figure_list()) {
+    EXPECT_TRUE(contains(html, "<code>" + figure.column() + "</code>")) << figure.key;
+  }
+  EXPECT_TRUE(contains(html, "<td class=\"word\">landing error</td><td>–</td>"));
+  // Nor is a figure rounded to what it is not.
+  (*run.summary)["coverage"]["area_fraction"] = 0.99996;
+  (*run.summary)["distance_m"] = 12345.6;
+  const std::string exact = run_report_html(run);
+  EXPECT_TRUE(contains(exact, "<dt>area covered</dt><dd>&gt; 99.9 %</dd>"));
+  EXPECT_TRUE(contains(exact, "<dt>distance flown</dt><dd>12346 m</dd>"));
+  run.title = "inflation_m 0.3, seed 7";
+  EXPECT_TRUE(contains(run_report_html(run), "<h1>room: inflation_m 0.3, seed 7"));
 }
 
 TEST(RunReport, ListsWhatEachDecisionHadToChooseFrom) {
@@ -132,6 +156,22 @@ TEST(RunReport, ThinningKeepsTheSmallestClearanceAndTheLargestError) {
   EXPECT_NEAR(flight["odometry_error_m"]["hi"].get<double>(), 9, 1e-9);
   EXPECT_NEAR(flight["odometry_yaw_error_rad"]["lo"].get<double>(), -3, 1e-9);
   EXPECT_EQ(flight["clearance_m"]["n"], flight["time_s"]["n"]);
+}
+
+TEST(RunReport, WhatWasNotMeasuredHidesNothingBesideIt) {
+  const TemporaryFolder folder;
+  test::write_synthetic_run(folder / "run", {.duration_s = 900});  // four rows make one
+  RunRecord run = read_run(folder / "run", 10);
+  const auto at = [&](const char* name) { return *run.flight.column(name); };
+  for (std::size_t i = 0; i < run.flight.rows.size(); ++i) {
+    if (i % 4 != 1) run.flight.rows[i][at("clearance_m")] = "";
+    if (i % 4 != 2) run.flight.rows[i][at("tracking_error_m")] = "";
+  }
+  run.flight.rows[8001][at("clearance_m")] = "0.01";
+  run.flight.rows[8002][at("tracking_error_m")] = "7";
+  const auto flight = run_payload(run)["flight"];
+  EXPECT_NEAR(flight["clearance_m"]["lo"].get<double>(), 0.01, 1e-9);
+  EXPECT_NEAR(flight["tracking_error_m"]["hi"].get<double>(), 7, 1e-9);
 }
 
 TEST(RunReport, PathsReadBackWithinAMillimetre) {

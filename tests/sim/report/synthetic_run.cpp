@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -16,6 +17,7 @@ namespace arex::sim::test {
 namespace {
 
 constexpr double kHalfWidth = 8;  // m, of the room
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 Pose helix(double t, double duration) {
   const double angle = 2 * std::numbers::pi * t / duration;
@@ -47,7 +49,7 @@ void write_flight(Recorder& recorder, const SyntheticRun& run) {
     row.stamp = stamp;
     row.speed_mps = 1 + 0.2 * std::sin(t);
     row.odometry_error_m = 0.001 * t;
-    row.clearance_m = t < 2 ? 0 : 1.2 + std::sin(0.7 * t);
+    row.clearance_m = t < 2 ? kUnknown : 1.2 + std::sin(0.7 * t);
     row.height_m = X.p.z();
     row.battery_power_w = 240;
     row.battery_fraction = 1 - 0.2 * t / run.duration_s;
@@ -111,6 +113,8 @@ nlohmann::ordered_json summary_of(const SyntheticRun& run) {
           {"coverage", {{"area_fraction", 0.98}, {"surface_fraction", 0.88}, {"t95_s", nullptr}}},
           {"map", nullptr},
           {"odometry", {{"source", "mocap"}, {"ate_rmse_m", 0.02}, {"ate_max_m", 0.03}}},
+          {"exploration", {{"targets", 2}, {"stop", "little_left"}}},
+          {"tracking", {{"rmse_m", 0.05}, {"landing_error_m", nullptr}}},
           {"collisions", 0}};
 }
 
@@ -166,6 +170,24 @@ void write_synthetic_sweep(const std::filesystem::path& folder) {
     }
   }
   write_synthetic_run(folder / "runs/0000000000000000", {});
+  arex::test::write_text(folder / "sweep.csv", csv);
+}
+
+void write_synthetic_failures(const std::filesystem::path& folder, int successes) {
+  std::string csv =
+      "run,scenario,planning.inflation_m,seed,failure,detail,outcome,reason,distance_m,"
+      "battery.remaining_fraction\n";
+  for (const double inflation : {0.3, 0.5}) {
+    for (int i = 0; i < 4; ++i) {
+      const bool succeeded = i < (inflation < 0.4 && successes > 0 ? 4 : successes);
+      const double distance = (inflation < 0.4 ? 10 : 13) + i;
+      csv += "runs/" + std::to_string(i) + ",room," + (inflation < 0.4 ? "0.3" : "0.5") + "," +
+             std::to_string(18446744073709551612U + static_cast<unsigned>(i)) + ",,," +
+             (succeeded ? "succeeded,mission done," : "collided,hit trunk 4 at 1.20 m/s,") +
+             std::to_string(succeeded ? distance : distance / 5) + ",0.5\n";
+    }
+  }
+  std::filesystem::create_directories(folder);
   arex::test::write_text(folder / "sweep.csv", csv);
 }
 

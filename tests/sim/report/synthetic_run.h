@@ -24,4 +24,9 @@ void write_synthetic_sweep(const std::filesystem::path& folder);
 /// Writes the sweep.csv of a Latin hypercube: two keys, 40 points, no two values the same.
 void write_synthetic_hypercube(const std::filesystem::path& folder);
 
+/// Writes the sweep.csv of two configurations, four seeds each, the largest there are: of the
+/// second `successes` succeed, of the first all, or none if that is none; failures flew a fifth as
+/// far.
+void write_synthetic_failures(const std::filesystem::path& folder, int successes);
+
 }  // namespace arex::sim::test

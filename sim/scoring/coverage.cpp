@@ -223,6 +223,8 @@ void add_figures(const CoverageResult& coverage, Figures& figures) {
   figures.set("coverage.heading_change_radpm", coverage.heading_change_radpm);
   figures.set("coverage.reachable_area_m2", coverage.area_m2);
   figures.set("coverage.surface_samples", coverage.surface_samples);
+  const double flown = coverage.rows.empty() ? 0 : coverage.rows.back().distance_m;
+  figures.set("coverage.area_m2_per_m", coverage.area_fraction * coverage.area_m2 / flown);
   for (std::size_t i = 0; i < coverage.classes.size(); ++i) {
     const ClassCoverage& c = coverage.classes[i];
     const std::string name(worlds::kSurfaceClassNames[i]);

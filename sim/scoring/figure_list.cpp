@@ -53,6 +53,8 @@ std::vector<FigureInfo> coverage_figures() {
        "path inside cells that were mapped, visited and left before; null without a path"},
       {"coverage.heading_change_radpm", "heading change", "rad/m", kLess, false,
        "sum of the course's changes over the path's length; null without a path"},
+      {"coverage.area_m2_per_m", "area covered per metre flown", "m^2/m", kMore, false,
+       "of the reachable area, up to the last score; null without a path"},
       {"coverage.reachable_area_m2", "reachable area", "m^2", kNeither, false,
        "what area_fraction is a share of"},
       {"coverage.surface_samples", "visible surface samples", "", kNeither, false,

@@ -50,6 +50,12 @@ std::uint64_t hash_of(const DepthImage& image) {
   return hash.value();
 }
 
+void add_to(TrajectoryHash& hash, const ImuSample& sample) {
+  hash.add(static_cast<std::uint64_t>(sample.stamp));
+  hash.add({sample.gyro_radps.data(), 3});
+  hash.add({sample.accel_mps2.data(), 3});
+}
+
 }  // namespace
 
 /// A frame of the LiDAR in the making: its parts are cast in any order, the last one joins them.
@@ -152,17 +158,28 @@ bool Simulation::tick() {
 void Simulation::fire_imu() {
   const StageTimer::Scope timed(timers_.imu);
   const Truth& truth = physics_.truth();
-  autopilot_.add_imu(imu_.sample(truth));
+  const ImuSample raw = imu_.sample(truth);
+  autopilot_.add_imu(raw);
+  add_to(imu_hash_, raw);
   if (const auto sample = imu_.output()) {
     stack_.add_imu(*sample);
+    add_to(imu_hash_, *sample);
     if (bag_) bag_->imu(*sample);
   }
-  if (const auto sample = imu_.magnetometer()) autopilot_.add_magnetometer(*sample);
-  if (const auto sample = imu_.barometer()) autopilot_.add_barometer(*sample);
+  if (const auto sample = imu_.magnetometer()) {
+    autopilot_.add_magnetometer(*sample);
+    imu_hash_.add({sample->field_gauss.data(), 3});
+  }
+  if (const auto sample = imu_.barometer()) {
+    autopilot_.add_barometer(*sample);
+    imu_hash_.add({&sample->pressure_pa, 1});
+  }
   if (now_ % kStatusPeriod == 0) {
     const BatteryState& battery = physics_.battery();
-    autopilot_.add_battery({now_, battery.voltage_v, battery.current_a});
-    stack_.add_battery({now_, battery.voltage_v, battery.current_a});
+    const BatterySample sample{now_, battery.voltage_v, battery.current_a};
+    autopilot_.add_battery(sample);
+    stack_.add_battery(sample);
+    imu_hash_.add(std::array{sample.voltage_v, sample.current_a});
     if (config_.stack.odometry.source == OdometryConfig::Source::kMocap) {
       const Pose X_OW = scorer_.X_WO().inverse();
       stack_.add_mocap({now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB});
@@ -189,6 +206,7 @@ void Simulation::fire_lidar() {
                    if (part + 1 < frame->parts.size()) return nullptr;
                    return [this, frame] {
                      sensor_hash_.add(frame->hash);
+                     lidar_hash_.add(frame->hash);
                      stack_.add_scan(frame->scan);
                      if (bag_) bag_->scan(*frame->scan);
                    };
@@ -214,6 +232,7 @@ void Simulation::fire_depth() {
                    const DepthImagePtr frame = camera_->capture(stamp, X_WB);
                    return [this, frame, hash = hash_of(*frame)] {
                      sensor_hash_.add(hash);
+                     depth_hash_.add(hash);
                      stack_.add_depth(frame);
                      if (bag_) bag_->depth(*frame);
                    };
@@ -358,6 +377,7 @@ FlightResult Simulation::finish() {
   result.duration = now_;
   result.trajectory_hash = hash_.text();
   result.sensor_hash = sensor_hash_.text();
+  result.device_hashes = {lidar_hash_.text(), depth_hash_.text(), imu_hash_.text()};
   result.collisions = collisions_;
   result.targets = stack_.mission().targets();
   result.flight = scorer_.score(physics_.truth(), stack_);

@@ -40,6 +40,13 @@ struct ExplorationLog {
   void add_figures(Figures& figures) const;
 };
 
+/// What each device delivered, as fingerprints: where two hosts differ, the first to differ tells.
+struct DeviceHashes {
+  std::string lidar;
+  std::string depth;
+  std::string imu;  ///< all that the autopilot's board measures: IMU, magnetometer, barometer, power
+};
+
 /// What a flight amounts to; summary.json comes from it.
 struct FlightResult {
   Outcome outcome = Outcome::kFlying;
@@ -47,6 +54,7 @@ struct FlightResult {
   Stamp duration = 0;
   std::string trajectory_hash;  ///< of the true state at every tick and every command
   std::string sensor_hash;      ///< of every scan and frame delivered
+  DeviceHashes device_hashes;
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;
@@ -129,7 +137,7 @@ class Simulation {
   std::int64_t depth_frame_ = 0;             ///< index of the next frame
 
   TrajectoryHash hash_;
-  TrajectoryHash sensor_hash_;
+  TrajectoryHash sensor_hash_, lidar_hash_, depth_hash_, imu_hash_;
   FlightScorer scorer_;
   std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
   std::vector<Vec3> path_W_;                  ///< flown since the last score

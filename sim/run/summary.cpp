@@ -43,6 +43,9 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("real_time_factor", sim_time / host.wall_s);
   figures.set("trajectory_hash", result.trajectory_hash);
   figures.set("sensor_hash", result.sensor_hash);
+  figures.set("device_hashes.lidar", result.device_hashes.lidar);
+  figures.set("device_hashes.depth", result.device_hashes.depth);
+  figures.set("device_hashes.imu", result.device_hashes.imu);
   figures.set("targets", targets_of(result));
   figures.set("collisions", result.collisions);
   figures.set("battery.used_wh", result.battery.used_wh);

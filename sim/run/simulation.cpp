@@ -375,9 +375,9 @@ FlightResult Simulation::finish() {
   result.outcome = outcome_;
   result.reason = reason_;
   result.duration = now_;
-  result.trajectory_hash = hash_.text();
+  result.trajectory_hash = trajectory_hash();
   result.sensor_hash = sensor_hash_.text();
-  result.device_hashes = {lidar_hash_.text(), depth_hash_.text(), imu_hash_.text()};
+  result.device_hashes = device_hashes();
   result.collisions = collisions_;
   result.targets = stack_.mission().targets();
   result.flight = scorer_.score(physics_.truth(), stack_);
@@ -396,7 +396,7 @@ FlightResult Simulation::finish() {
     recorder_->write_maps(stack_.perception().mapper());
   }
   result.battery = physics_.battery();
-  if (camera_) result.renderer = camera_->renderer_name();
+  if (camera_) result.renderer = Renderer::kName;
   for (const StageTimer* timer :
        {&timers_.imu, &timers_.stack, &timers_.autopilot, &timers_.physics, &timers_.recording}) {
     result.timing.push_back(summarise(timer->name(), timer->seconds()));

@@ -44,7 +44,8 @@ struct ExplorationLog {
 struct DeviceHashes {
   std::string lidar;
   std::string depth;
-  std::string imu;  ///< all that the autopilot's board measures: IMU, magnetometer, barometer, power
+  std::string
+      imu;  ///< all that the autopilot's board measures: IMU, magnetometer, barometer, power
 };
 
 /// What a flight amounts to; summary.json comes from it.
@@ -93,6 +94,11 @@ class Simulation {
   [[nodiscard]] Stamp now() const { return now_; }
   [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
   [[nodiscard]] const Stack& stack() const { return stack_; }
+  // Of what was flown so far.
+  [[nodiscard]] std::string trajectory_hash() const { return hash_.text(); }
+  [[nodiscard]] DeviceHashes device_hashes() const {
+    return {lidar_hash_.text(), depth_hash_.text(), imu_hash_.text()};
+  }
   /// Scores what was flown. Call it once, at the end.
   FlightResult finish();
 

@@ -9,10 +9,7 @@ D430::D430(const D430Config& config, const worlds::World& world, const Pose& X_B
     : config_(config),
       X_BC_(X_BC),
       random_(seed, "d430"),
-      renderer_(world, config.camera(),
-                {.egl = {.software = config.software_rendering,
-                         .rasterizer_threads = config.rasterizer_threads},
-                 .far_m = config.draw_range_m}),
+      renderer_(world, config.camera(), {.far_m = config.draw_range_m}),
       stereo_(config) {}
 
 DepthImagePtr D430::capture(Stamp stamp, const Pose& X_WB) {

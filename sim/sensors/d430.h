@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "math/pose.h"
@@ -19,15 +18,12 @@ namespace arex::sim {
 /// when somebody reads it, on any thread, in any order. One frame at a time per device.
 class D430 {
  public:
-  /// The world is copied to the graphics device; it need not outlive this.
-  /// @throws std::runtime_error if there is no headless OpenGL 4.5.
+  /// The world is copied; it need not outlive this.
   D430(const D430Config& config, const worlds::World& world, const Pose& X_BC, std::uint64_t seed);
 
   /// The frame taken at `stamp` with the body at X_WB.
   [[nodiscard]] DepthImagePtr capture(Stamp stamp, const Pose& X_WB);
 
-  /// Stands in the run's summary: a GPU's depth differs from llvmpipe's in the last bits.
-  [[nodiscard]] const std::string& renderer_name() const { return renderer_.renderer_name(); }
   [[nodiscard]] Renderer::Statistics last_frame() const { return renderer_.last_frame(); }
 
  private:

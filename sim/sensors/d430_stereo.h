@@ -26,8 +26,6 @@ struct D430Config {
   int edge_loss_min_px = 1;             ///< on each side: 2 to 4 px in all
   int edge_loss_max_px = 2;
   double max_incidence_rad = 75.0 / 180.0 * std::numbers::pi;
-  bool software_rendering = false;
-  int rasterizer_threads = 0;
 
   void fields(auto& f) {
     f("noise_free", noise_free, "exact depths within the range limits, for tests");
@@ -46,8 +44,6 @@ struct D430Config {
     f("edge_loss_min_px", edge_loss_min_px, "pixels lost on each side of a depth edge, least");
     f("edge_loss_max_px", edge_loss_max_px, "pixels lost on each side of a depth edge, most");
     f("max_incidence_rad", max_incidence_rad, "surfaces seen more obliquely are lost");
-    f("software_rendering", software_rendering, "draw with llvmpipe even where there is a GPU");
-    f("rasterizer_threads", rasterizer_threads, "llvmpipe's own threads; 0: the calling thread");
     f.check(rate_hz > 0 && rate_hz <= 1000, "0 < rate_hz <= 1000");
     f.check(width_px >= 8 && width_px <= 4096, "8 <= width_px <= 4096");
     f.check(height_px >= 8 && height_px <= 4096, "8 <= height_px <= 4096");
@@ -68,7 +64,6 @@ struct D430Config {
             "edge_loss_min_px <= edge_loss_max_px <= 16");
     f.check(max_incidence_rad > 0 && max_incidence_rad <= std::numbers::pi / 2,
             "0 < max_incidence_rad <= pi/2");
-    f.check(rasterizer_threads >= 0 && rasterizer_threads <= 64, "0 <= rasterizer_threads <= 64");
   }
 
   /// Intrinsics of the left imager, which the depth image belongs to.

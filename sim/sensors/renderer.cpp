@@ -1,120 +1,100 @@
 #include "sensors/renderer.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
 #include <numeric>
-#include <optional>
 
 #include "sensors/renderer_culling.h"
-#include "sensors/renderer_gl.h"
 
 namespace arex::sim {
 namespace {
 
-constexpr const char* kDepthVertexShader = R"(#version 450 core
-layout(location = 0) in vec3 p_W;
-layout(location = 0) uniform mat4 clip_from_world;
-void main() { gl_Position = clip_from_world * vec4(p_W, 1.0); }
-)";
+// Pixels are decided four at a time: GCC's vectors, whose arithmetic is each number's own.
+constexpr int kLanes = 4;
+using Double4 = double __attribute__((vector_size(32)));
+using Long4 = std::int64_t __attribute__((vector_size(32)));
+using Float4 = float __attribute__((vector_size(16)));
 
-/// Clip coordinates of a pinhole camera: z = near and w = Z, so that the depth buffer holds near/Z
-/// (1 at the near plane, 0 at infinity). Image row 0 is GL's row 0, so that a read-back starts at
-/// the top.
-Eigen::Matrix4f clip_from_world(const PinholeCamera& camera, const Pose& X_WC, double near_m) {
-  const double w = camera.width, h = camera.height;
-  Eigen::Matrix4d clip_from_camera;
-  clip_from_camera << 2 * camera.fx / w, 0, (2 * camera.cx + 1 - w) / w, 0,  //
-      0, 2 * camera.fy / h, (2 * camera.cy + 1 - h) / h, 0,                  //
-      0, 0, 0, near_m,                                                       //
-      0, 0, 1, 0;
-  const Pose X_CW = X_WC.inverse();
-  Eigen::Matrix4d camera_from_world = Eigen::Matrix4d::Identity();
-  camera_from_world.topLeftCorner<3, 3>() = X_CW.R;
-  camera_from_world.topRightCorner<3, 1>() = X_CW.p;
-  return (clip_from_camera * camera_from_world).cast<float>();
+template <class Vector, class Scalar>
+Vector load(const Scalar* from) {
+  Vector v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
 }
 
-/// A world's mesh, its vertices on the device. What a view touches is gathered into one index list
-/// per frame, nearest clusters first: two draw calls, which llvmpipe takes in less time than a draw
-/// call per chunk.
-class DeviceMesh {
- public:
-  explicit DeviceMesh(const worlds::Mesh& mesh) : mesh_(cluster_mesh(mesh, kClusterTriangles)) {
-    gl::upload(vertices_, mesh_.vertices);
-    indices_.reserve(mesh_.triangles.size());
-    glNamedBufferStorage(index_buffer_.id(), index_bytes(mesh_.triangles.size() + 1), nullptr,
-                         GL_DYNAMIC_STORAGE_BIT);
-    glVertexArrayVertexBuffer(array_.id(), 0, vertices_.id(), 0, sizeof(Vec3f));
-    glVertexArrayElementBuffer(array_.id(), index_buffer_.id());
-    glEnableVertexArrayAttrib(array_.id(), 0);
-    glVertexArrayAttribFormat(array_.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
-  }
+constexpr std::uint32_t kClusterTriangles = 64;
+constexpr std::size_t kMostCorners = 3 * kClusterTriangles;
 
-  /// Draws what `view` may see, nearest first; everything without a view. The far sides of solids
-  /// are left out: half of the triangles of a forest's wood.
-  Renderer::Statistics draw(const std::optional<ViewVolume>& view) {
-    indices_.clear();
-    std::vector<std::uint32_t> visible(mesh_.clusters.size());
-    std::iota(visible.begin(), visible.end(), 0U);
-    if (view) visible = visible_chunks(mesh_.clusters, *view);
-    const std::size_t closed = gather(visible, true);
-    const std::size_t open = gather(visible, false);
-    glNamedBufferSubData(index_buffer_.id(), 0, index_bytes(indices_.size()), indices_.data());
-    glBindVertexArray(array_.id());
-    glFrontFace(GL_CW);  // the projection mirrors the picture
-    glCullFace(GL_BACK);
-    glEnable(GL_CULL_FACE);
-    draw_range(0, closed);
-    glDisable(GL_CULL_FACE);
-    draw_range(closed, open);
-    return {visible.size(), indices_.size()};
-  }
+// A triangle seen more nearly edge-on than this sine covers no pixel's centre, and its depth would
+// have no digits.
+constexpr double kEdgeOn = 1e-9;
+// What a triangle's bounds in the image are widened by, px: far more than their rounding.
+constexpr double kBoundsMargin = 1e-6;
+// From this width on, each row's run between the edges is worth looking for, px.
+constexpr int kWide = 16;
 
- private:
-  static constexpr std::uint32_t kClusterTriangles = 64;
-  using Triangle = std::array<std::uint32_t, 3>;
-
-  static GLsizeiptr index_bytes(std::size_t triangles) {
-    return static_cast<GLsizeiptr>(triangles * sizeof(Triangle));
-  }
-
-  /// Appends the triangles of the closed or of the open clusters; returns their number.
-  std::size_t gather(const std::vector<std::uint32_t>& clusters, bool closed) {
-    const std::size_t before = indices_.size();
-    for (const std::uint32_t i : clusters) {
-      if (mesh_.closed[i] != closed) continue;
-      const auto first = mesh_.triangles.begin() + mesh_.clusters[i].first_triangle;
-      indices_.insert(indices_.end(), first, first + mesh_.clusters[i].triangle_count);
-    }
-    return indices_.size() - before;
-  }
-
-  static void draw_range(std::size_t first, std::size_t count) {
-    if (count == 0) return;
-    const std::size_t offset = first * sizeof(Triangle);
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * count), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(offset));  // NOLINT: GL's way to say offset
-  }
-
-  ClusteredMesh mesh_;
-  gl::VertexArray array_;
-  gl::Buffer vertices_, index_buffer_;
-  std::vector<Triangle> indices_;  ///< of the frame under way
+/// A few dozen triangles that lie close together, with corners of their own.
+struct Cluster {
+  std::uint32_t first_triangle = 0, triangle_count = 0;
+  std::uint32_t first_corner = 0, corner_count = 0;
+  bool closed = false;  ///< part of a solid: its far side is never seen
 };
 
-/// Shaders and target of the depth-only pass.
-struct DepthPass {
-  gl::Program program{kDepthVertexShader, nullptr};
-  gl::Framebuffer framebuffer;
-  gl::Renderbuffer depth;
+/// The corners of one cluster in C, m, and where they fall in the picture, px.
+struct Corners {
+  std::array<double, kMostCorners> x, y, z, u, v;
+  [[nodiscard]] Vec3 at(std::size_t i) const { return {x[i], y[i], z[i]}; }
+};
 
-  explicit DepthPass(const PinholeCamera& camera) {
-    glNamedRenderbufferStorage(depth.id(), GL_DEPTH_COMPONENT32F, camera.width, camera.height);
-    glNamedFramebufferRenderbuffer(framebuffer.id(), GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
-                                   depth.id());
-    glNamedFramebufferDrawBuffer(framebuffer.id(), GL_NONE);
-    glNamedFramebufferReadBuffer(framebuffer.id(), GL_NONE);
-    if (glCheckNamedFramebufferStatus(framebuffer.id(), GL_DRAW_FRAMEBUFFER) !=
-        GL_FRAMEBUFFER_COMPLETE) {
-      throw std::runtime_error("the graphics device has no 32-bit float depth target");
+/// Pixels from the first up to the last, both included.
+struct Box {
+  int u_first = 0, u_last = -1, v_first = 0, v_last = -1;
+  [[nodiscard]] bool empty() const { return u_first > u_last || v_first > v_last; }
+};
+
+/// A triangle as functions of a pixel's ray (x, y, 1): linear, n . ray.
+struct Footprint {
+  std::array<Vec3, 3> edges;    ///< none is negative where the ray passes inside
+  Vec3 inverse_depth;           ///< 1/z of its plane, 1/m
+  std::array<double, 3> roots;  ///< an edge is zero at x = roots[i] * (its value at x = 0)
+};
+
+/// The world's mesh in clusters, corners split by coordinate.
+struct DepthMesh {
+  std::vector<Cluster> clusters;
+  std::vector<worlds::Chunk> bounds;                   ///< of each cluster, for culling
+  std::vector<float> x, y, z;                          ///< corners in W, m
+  std::vector<std::array<std::uint8_t, 3>> triangles;  ///< corners, counted within the cluster
+
+  explicit DepthMesh(const worlds::Mesh& mesh) {
+    const ClusteredMesh clustered = cluster_mesh(mesh, kClusterTriangles);
+    bounds = clustered.clusters;
+    constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::uint32_t> corner_of(clustered.vertices.size(), kUnused);
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+      Cluster cluster{bounds[i].first_triangle, bounds[i].triangle_count,
+                      static_cast<std::uint32_t>(x.size()), 0, clustered.closed[i]};
+      for (std::uint32_t k = 0; k < cluster.triangle_count; ++k) {
+        std::array<std::uint8_t, 3> triangle{};
+        for (std::size_t j = 0; j < 3; ++j) {
+          const std::uint32_t vertex = clustered.triangles[cluster.first_triangle + k][j];
+          // Numbers below first_corner are an earlier cluster's.
+          if (corner_of[vertex] == kUnused || corner_of[vertex] < cluster.first_corner) {
+            corner_of[vertex] = static_cast<std::uint32_t>(x.size());
+            x.push_back(clustered.vertices[vertex].x());
+            y.push_back(clustered.vertices[vertex].y());
+            z.push_back(clustered.vertices[vertex].z());
+          }
+          triangle[j] = static_cast<std::uint8_t>(corner_of[vertex] - cluster.first_corner);
+        }
+        triangles.push_back(triangle);
+      }
+      cluster.corner_count = static_cast<std::uint32_t>(x.size()) - cluster.first_corner;
+      clusters.push_back(cluster);
     }
   }
 };
@@ -122,63 +102,172 @@ struct DepthPass {
 }  // namespace
 
 struct Renderer::Impl {
+  Impl(const worlds::World& world, const PinholeCamera& camera_in,
+       const RendererOptions& options_in)
+      : camera(camera_in),
+        options(options_in),
+        mesh(world.mesh),
+        stride((camera.width + kLanes - 1) / kLanes * kLanes) {
+    for (int u = 0; u < stride; ++u) ray_x.push_back((u - camera.cx) / camera.fx);
+    for (int v = 0; v < camera.height; ++v) ray_y.push_back((v - camera.cy) / camera.fy);
+  }
+
+  void draw(const Cluster& cluster, const Pose& X_CW);
+  void place(const Cluster& cluster, const Pose& X_CW);
+  [[nodiscard]] Box box_of(std::size_t a, std::size_t b, std::size_t c) const;
+  [[nodiscard]] bool footprint(const Vec3& a, const Vec3& b, const Vec3& c, bool closed,
+                               Footprint& out) const;
+  void fill(const Footprint& footprint, const Box& box);
+  void fill_row(const Footprint& footprint, int v, int u_first, int u_last);
+
   PinholeCamera camera;
   RendererOptions options;
-  EglContext context;
-  std::optional<DeviceMesh> mesh;
-  std::optional<DepthPass> depth_pass;
+  DepthMesh mesh;
+  int stride;                        ///< of the picture under way, a multiple of the lanes, px
+  std::vector<double> ray_x, ray_y;  ///< of each column and row
+  std::vector<float> picture;        ///< 1/z so far
+  Corners corners;
   Statistics last_frame;
-
-  Impl(const PinholeCamera& camera_in, const RendererOptions& options_in)
-      : camera(camera_in), options(options_in), context(options_in.egl) {}
 };
+
+/// Brings a cluster's corners into C and into the picture.
+void Renderer::Impl::place(const Cluster& cluster, const Pose& X_CW) {
+  const Mat3& R = X_CW.R;
+  const Vec3& p = X_CW.p;
+  const float* x = &mesh.x[cluster.first_corner];
+  const float* y = &mesh.y[cluster.first_corner];
+  const float* z = &mesh.z[cluster.first_corner];
+  for (std::size_t i = 0; i < cluster.corner_count; ++i) {
+    const double x_W = x[i], y_W = y[i], z_W = z[i];
+    corners.x[i] = R(0, 0) * x_W + R(0, 1) * y_W + R(0, 2) * z_W + p.x();
+    corners.y[i] = R(1, 0) * x_W + R(1, 1) * y_W + R(1, 2) * z_W + p.y();
+    corners.z[i] = R(2, 0) * x_W + R(2, 1) * y_W + R(2, 2) * z_W + p.z();
+    corners.u[i] = camera.cx + camera.fx * corners.x[i] / corners.z[i];
+    corners.v[i] = camera.cy + camera.fy * corners.y[i] / corners.z[i];
+  }
+}
+
+/// The pixels whose centres a triangle may cover: all of them where it reaches behind the near
+/// plane.
+Box Renderer::Impl::box_of(std::size_t a, std::size_t b, std::size_t c) const {
+  const auto lowest = [&](const auto& k) { return std::min(k[a], std::min(k[b], k[c])); };
+  const auto highest = [&](const auto& k) { return std::max(k[a], std::max(k[b], k[c])); };
+  const double z_low = lowest(corners.z), z_high = highest(corners.z);
+  if (z_high < options.near_m || z_low > options.far_m) return {};
+  const double u_end = camera.width - 1, v_end = camera.height - 1;
+  if (z_low < options.near_m) return {0, camera.width - 1, 0, camera.height - 1};
+  const double u_low = std::max(lowest(corners.u) - kBoundsMargin, 0.0);
+  const double v_low = std::max(lowest(corners.v) - kBoundsMargin, 0.0);
+  const double u_high = std::min(highest(corners.u) + kBoundsMargin, u_end);
+  const double v_high = std::min(highest(corners.v) + kBoundsMargin, v_end);
+  if (u_low > u_high || v_low > v_high) return {};
+  return {static_cast<int>(std::ceil(u_low)), static_cast<int>(u_high),
+          static_cast<int>(std::ceil(v_low)), static_cast<int>(v_high)};
+}
+
+/// @return false if the triangle shows the camera its edge or, of a solid, its inside
+bool Renderer::Impl::footprint(const Vec3& a, const Vec3& b, const Vec3& c, bool closed,
+                               Footprint& out) const {
+  const Vec3 normal = (b - a).cross(c - a);
+  const double offset = normal.dot(a);  // positive: seen from inside
+  if (closed && offset >= 0) return false;
+  if (offset * offset <= kEdgeOn * kEdgeOn * normal.squaredNorm() * a.squaredNorm()) return false;
+  // a x b is -(b x a) to the last bit: two triangles agree about the edge between them.
+  const double sign = offset > 0 ? 1 : -1;
+  out.edges = {sign * a.cross(b), sign * b.cross(c), sign * c.cross(a)};
+  out.inverse_depth = normal / offset;
+  for (std::size_t i = 0; i < 3; ++i) out.roots[i] = -1 / out.edges[i].x();
+  return true;
+}
+
+/// Sets the pixels of a row that the triangle covers and nothing nearer does.
+void Renderer::Impl::fill_row(const Footprint& footprint, int v, int u_first, int u_last) {
+  const double y = ray_y[static_cast<std::size_t>(v)];
+  const auto& [e0, e1, e2] = footprint.edges;
+  const Vec3& depth = footprint.inverse_depth;
+  const double row0 = e0.y() * y + e0.z(), row1 = e1.y() * y + e1.z(), row2 = e2.y() * y + e2.z();
+  const double row_depth = depth.y() * y + depth.z();
+  const double most = 1 / options.near_m;
+  float* row = &picture[static_cast<std::size_t>(v) * static_cast<std::size_t>(stride)];
+  for (int u = u_first / kLanes * kLanes; u <= u_last; u += kLanes) {
+    const auto x = load<Double4>(&ray_x[static_cast<std::size_t>(u)]);
+    const Double4 q = depth.x() * x + row_depth;
+    const Long4 seen = (e0.x() * x + row0 >= 0) & (e1.x() * x + row1 >= 0) &
+                       (e2.x() * x + row2 >= 0) & (q <= most);
+    const auto drawn = __builtin_convertvector(seen ? q : Double4{}, Float4);
+    const auto before = load<Float4>(row + u);
+    const Float4 after = drawn > before ? drawn : before;
+    std::memcpy(row + u, &after, sizeof after);
+  }
+}
+
+void Renderer::Impl::fill(const Footprint& footprint, const Box& box) {
+  const bool wide = box.u_last - box.u_first >= kWide;
+  for (int v = box.v_first; v <= box.v_last; ++v) {
+    double first = box.u_first, last = box.u_last;
+    for (std::size_t i = 0; wide && i < 3; ++i) {
+      // A pixel of slack on both sides: fill_row decides.
+      const Vec3& edge = footprint.edges[i];
+      const double at_centre = edge.y() * ray_y[static_cast<std::size_t>(v)] + edge.z();
+      const double u = camera.cx + camera.fx * (at_centre * footprint.roots[i]);
+      if (edge.x() > 0) first = std::max(first, u - 1);
+      if (edge.x() < 0) last = std::min(last, u + 1);
+      if (edge.x() == 0 && at_centre < 0) last = first - 1;
+    }
+    if (first <= last) fill_row(footprint, v, static_cast<int>(first), static_cast<int>(last));
+  }
+}
+
+void Renderer::Impl::draw(const Cluster& cluster, const Pose& X_CW) {
+  place(cluster, X_CW);
+  Footprint footprint_of_triangle;
+  for (std::uint32_t i = 0; i < cluster.triangle_count; ++i) {
+    const auto& [a, b, c] = mesh.triangles[cluster.first_triangle + i];
+    const Box box = box_of(a, b, c);
+    if (box.empty()) continue;
+    if (!footprint(corners.at(a), corners.at(b), corners.at(c), cluster.closed,
+                   footprint_of_triangle)) {
+      continue;
+    }
+    fill(footprint_of_triangle, box);
+  }
+}
 
 Renderer::Renderer(const worlds::World& world, const PinholeCamera& camera,
                    const RendererOptions& options)
-    : impl_(std::make_unique<Impl>(camera, options)) {
-  const EglContext::Current current(impl_->context);
-  impl_->mesh.emplace(world.mesh);
-  impl_->depth_pass.emplace(camera);
-  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-}
+    : impl_(std::make_unique<Impl>(world, camera, options)) {}
 
-Renderer::~Renderer() {
-  const EglContext::Current current(impl_->context);
-  impl_->depth_pass.reset();
-  impl_->mesh.reset();
-}
+Renderer::~Renderer() = default;
 
 void Renderer::render_inverse_depth(const Pose& X_WC, std::vector<float>& out) {
-  const PinholeCamera& camera = impl_->camera;
-  const RendererOptions& options = impl_->options;
-  out.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
-  std::optional<ViewVolume> view;
-  if (options.cull) view.emplace(camera, X_WC, options.far_m);
-  const Eigen::Matrix4f matrix = clip_from_world(camera, X_WC, options.near_m);
-  {
-    const EglContext::Current current(impl_->context);
-    glBindFramebuffer(GL_FRAMEBUFFER, impl_->depth_pass->framebuffer.id());
-    glViewport(0, 0, camera.width, camera.height);
-    glEnable(GL_DEPTH_TEST);
-    glDepthFunc(GL_GREATER);
-    glClearDepth(0.0);
-    glClear(GL_DEPTH_BUFFER_BIT);
-    glUseProgram(impl_->depth_pass->program.id());
-    glUniformMatrix4fv(0, 1, GL_FALSE, matrix.data());
-    impl_->last_frame = impl_->mesh->draw(view);
-    glReadPixels(0, 0, camera.width, camera.height, GL_DEPTH_COMPONENT, GL_FLOAT, out.data());
+  Impl& impl = *impl_;
+  const PinholeCamera& camera = impl.camera;
+  const auto width = static_cast<std::size_t>(camera.width);
+  const auto height = static_cast<std::size_t>(camera.height);
+  const auto stride = static_cast<std::size_t>(impl.stride);
+  std::vector<std::uint32_t> visible(impl.mesh.clusters.size());
+  std::iota(visible.begin(), visible.end(), 0U);
+  if (impl.options.cull) {
+    visible = visible_chunks(impl.mesh.bounds, ViewVolume(camera, X_WC, impl.options.far_m));
   }
-  // Chunks that reach beyond far_m are drawn whole: what lies beyond is cut here, so that the
-  // picture does not depend on how the world is cut into chunks.
-  const float scale = static_cast<float>(1 / options.near_m);
-  const float least = static_cast<float>(options.near_m / options.far_m);
-  float* value = out.data();
-  const std::size_t pixels = out.size();
-  for (std::size_t i = 0; i < pixels; ++i) value[i] = value[i] < least ? 0.0F : value[i] * scale;
+  impl.picture.assign(stride * height, 0.0F);
+  impl.last_frame = {visible.size(), 0};
+  const Pose X_CW = X_WC.inverse();
+  for (const std::uint32_t i : visible) {
+    impl.draw(impl.mesh.clusters[i], X_CW);
+    impl.last_frame.triangles += impl.mesh.clusters[i].triangle_count;
+  }
+  // Triangles that reach beyond far_m are drawn whole and cut here, so that the picture does not
+  // depend on how the world is cut into clusters.
+  const auto least = static_cast<float>(1 / impl.options.far_m);
+  out.resize(width * height);
+  for (std::size_t v = 0; v < height; ++v) {
+    const float* in = &impl.picture[v * stride];
+    std::transform(in, in + width, &out[v * width],
+                   [least](float q) { return q < least ? 0.0F : q; });
+  }
 }
 
 Renderer::Statistics Renderer::last_frame() const { return impl_->last_frame; }
-const std::string& Renderer::renderer_name() const { return impl_->context.renderer_name(); }
 
 }  // namespace arex::sim

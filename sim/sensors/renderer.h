@@ -1,30 +1,34 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "math/pose.h"
 #include "messages/sensors.h"
-#include "sensors/egl.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
 
 struct RendererOptions {
-  EglOptions egl;
-  double near_m = 0.02;  ///< nothing closer is drawn; costs no precision, the depth is reciprocal
+  double near_m = 0.02;  ///< nothing closer is drawn
   double far_m = 12.0;   ///< nothing deeper is drawn
   bool cull = true;      ///< draw only the chunks that may be seen; off, for tests
 };
 
-/// Draws what a pinhole camera sees of a world, from a copy of its mesh on the graphics device.
+/// What a pinhole camera sees of a world: a depth rasteriser on the CPU.
 ///
-/// Each kind of picture is a pass: shaders and a framebuffer of its own over the same mesh, culling
-/// and projection. Depth is the only one so far; an infrared image adds a grey attachment and a
-/// fragment shader, and the right imager is the same pass from a shifted pose.
+/// Which triangles a pixel's centre ray passes, and how deep, is decided in double precision by
+/// additions, multiplications and comparisons whose results IEEE 754 fixes: the same bits on every
+/// host, whatever its graphics. The edge of two triangles is one line, whichever of them asks, so
+/// that a closed surface has no holes; and the nearest surface wins whatever is drawn first.
+///
+/// Source: Olano and Greer, Triangle scan conversion using 2D homogeneous coordinates, 1997: edges
+/// are planes through the eye, so that nothing is clipped, in front of the eye or beside it.
 class Renderer {
  public:
+  static constexpr const char* kName = "rasterizer in double precision";  ///< in a run's summary
+
   struct Statistics {
     std::size_t chunks = 0;
     std::size_t triangles = 0;
@@ -35,13 +39,12 @@ class Renderer {
   ~Renderer();
 
   /// 1/z of the nearest surface in each pixel (1/m; z the depth in C), rows from the top, 0 where
-  /// there is nothing up to far_m. Linear across the image of a plane, and so is the precision:
-  /// better than 0.1 mm at 10 m. `out` is resized. Callable from any thread.
+  /// there is nothing up to far_m. Linear across the image of a plane; exact to single precision.
+  /// `out` is resized. Callable from any thread, one at a time.
   void render_inverse_depth(const Pose& X_WC, std::vector<float>& out);
 
   /// What the last frame drew.
   [[nodiscard]] Statistics last_frame() const;
-  [[nodiscard]] const std::string& renderer_name() const;
 
  private:
   struct Impl;

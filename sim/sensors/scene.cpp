@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <future>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,26 +16,86 @@ namespace arex::sim {
 namespace {
 
 constexpr std::size_t kPacket = 8;
-// Below this cosine the plane's distance is ill-conditioned and Embree's own is kept.
-constexpr float kGrazing = 1e-4F;
+// Embree's distances and boxes are right to single precision: what they are widened by, so that
+// nothing is missed that our own arithmetic may find nearer.
+constexpr float kSlack = 1e-3F;  // m
+constexpr float kRelativeSlack = 0x1p-9F;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// All that a hit needs of its triangle, half a cache line.
-struct alignas(32) Facet {
-  Vec3f corner_W = Vec3f::Zero();
+/// All that a hit needs of its triangle, one cache line.
+struct alignas(64) Facet {
+  std::array<Vec3f, 3> corners_W;
   Vec3f normal_W = Vec3f::Zero();  ///< unit
   float reflectivity = 0;
   std::uint32_t object = Hit::kNone;
 };
 
-template <class Scalar>
-Scalar plane_distance(const Facet& facet, const Eigen::Matrix<Scalar, 3, 1>& origin,
-                      const Eigen::Matrix<Scalar, 3, 1>& direction, Scalar fallback) {
-  const Eigen::Matrix<Scalar, 3, 1> normal = facet.normal_W.template cast<Scalar>();
-  const Scalar rate = normal.dot(direction);
-  if (std::abs(rate) < Scalar(kGrazing)) return fallback;
-  return normal.dot(facet.corner_W.template cast<Scalar>() - origin) / rate;
+/// By how much Embree may be wrong about a distance.
+float widening(float t) { return kSlack + kRelativeSlack * t; }
+
+/// The triangle that a ray meets first.
+struct Meeting {
+  double distance = kInfinity;
+  std::uint32_t triangle = Hit::kNone;
+  auto operator<=>(const Meeting&) const = default;
+};
+
+/// A ray on its way through the tree, and the triangles that may be the first it meets.
+struct Search {
+  Vec3 o, d;
+  double from = 0, to = 0;
+  float nearest = std::numeric_limits<float>::infinity();  ///< by Embree's distance
+  std::size_t count = 0;
+  std::array<std::uint32_t, 4> candidates{};
+
+  [[nodiscard]] Meeting at(std::uint32_t triangle, const std::vector<Facet>& facets) const {
+    return {distance_along(o, d, facets[triangle].corners_W), triangle};
+  }
+  /// The first of the candidates, from the start of the ray to its end.
+  [[nodiscard]] Meeting first(const std::vector<Facet>& facets) const {
+    Meeting best{to, Hit::kNone};
+    for (std::size_t i = 0; i < count; ++i) {
+      const Meeting meeting = at(candidates[i], facets);
+      if (meeting.distance >= from) best = std::min(best, meeting);
+    }
+    return best;
+  }
+  /// Takes a triangle that the ray meets at Embree's distance t. @return whether it is the nearest
+  bool note(std::uint32_t triangle, float t, const std::vector<Facet>& facets) {
+    const bool at_start = t <= static_cast<float>(from) + widening(t);
+    if (at_start && at(triangle, facets).distance < from) return false;
+    if (t + widening(t) < nearest) count = 0;  // all others lie behind it
+    if (count == candidates.size()) {
+      const Meeting best = first(facets);
+      count = 0;
+      if (best.triangle != Hit::kNone) candidates[count++] = best.triangle;
+    }
+    candidates[count++] = triangle;
+    if (t >= nearest) return false;
+    nearest = t;
+    return true;
+  }
+};
+
+struct Packet {
+  RTCIntersectContext context{};  ///< the first member: what Embree hands to note_all()
+  const std::vector<Facet>* facets = nullptr;
+  std::array<Search, kPacket> searches{};
+};
+
+/// Embree calls this for every triangle that a ray meets.
+void note_all(const RTCFilterFunctionNArguments* args) {
+  auto& packet = *reinterpret_cast<Packet*>(args->context);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    Search& search = packet.searches[RTCRayN_id(args->ray, args->N, i)];
+    float& t = RTCRayN_tfar(args->ray, args->N, i);
+    const bool nearest = search.note(RTCHitN_primID(args->hit, args->N, i), t, *packet.facets);
+    args->valid[i] = nearest ? -1 : 0;
+    if (nearest) t += widening(t);  // Embree goes on up to here
+  }
 }
 
 /// Nearest point of triangle (a, b, c) to p.
@@ -80,8 +142,7 @@ bool visit_triangle(RTCPointQueryFunctionArguments* args) {
   const double distance = (nearest_on_triangle(nearest.p_W, a, b, c) - nearest.p_W).norm();
   if (distance >= nearest.best_m) return false;
   nearest.best_m = distance;
-  // Rounded up, so that the sphere of the search never cuts off a nearer triangle.
-  args->query->radius = std::nextafter(static_cast<float>(distance) * 1.000001F, 1e30F);
+  args->query->radius = static_cast<float>(distance) + widening(static_cast<float>(distance));
   return true;
 }
 
@@ -137,8 +198,8 @@ struct Scene::Embree {
 
   void attach(std::size_t vertex_count) {
     scene = rtcNewScene(device);
-    // Not robust: a ray may slip through a seam between triangles (never seen in 1e7), casts are 40
-    // % faster, and only without it does the high-quality build split triangles.
+    // Robust: a box or a triangle that a ray grazes is searched, not missed.
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
     if (triangles.empty()) return;
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -148,6 +209,7 @@ struct Scene::Embree {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                triangles.data(), 0, sizeof(Triangle), triangles.size());
     rtcSetGeometryPointQueryFunction(geometry, visit_triangle);
+    rtcSetGeometryIntersectFilterFunction(geometry, note_all);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
@@ -162,7 +224,7 @@ struct Scene::Embree {
       const Vec3 b = vertices[t[1]].cast<double>();
       const Vec3 c = vertices[t[2]].cast<double>();
       Facet& facet = facets[i];
-      facet.corner_W = vertices[t[0]];
+      facet.corners_W = {vertices[t[0]], vertices[t[1]], vertices[t[2]]};
       facet.normal_W = (b - a).cross(c - a).normalized().cast<float>();
       facet.object = world.mesh.object_of_triangle[i];
       class_of_triangle[i] = world.class_of_triangle(i);
@@ -170,88 +232,90 @@ struct Scene::Embree {
     }
   }
 
-  void cast_packet(RTCScene tree, std::span<const Ray> rays, std::span<RayHit> hits) const {
+  /// The nearest triangle of each of at most kPacket rays, kNone where there is none, and how far
+  /// away it is.
+  void cast_packet(RTCScene tree, std::span<const Ray> rays, std::span<Meeting> found) const {
     alignas(32) std::array<int, kPacket> active{};
-    RTCRayHit8 packet;
+    RTCRayHit8 query;
+    Packet packet;
+    packet.facets = &facets;
     for (std::size_t i = 0; i < kPacket; ++i) {
       const Ray& ray = rays[std::min(i, rays.size() - 1)];
-      active[i] = i < rays.size() ? -1 : 0;
-      packet.ray.org_x[i] = ray.origin_W.x();
-      packet.ray.org_y[i] = ray.origin_W.y();
-      packet.ray.org_z[i] = ray.origin_W.z();
-      packet.ray.dir_x[i] = ray.direction_W.x();
-      packet.ray.dir_y[i] = ray.direction_W.y();
-      packet.ray.dir_z[i] = ray.direction_W.z();
-      packet.ray.tnear[i] = ray.min_distance_m;
-      packet.ray.tfar[i] = ray.max_distance_m;
-      packet.ray.time[i] = 0;
-      packet.ray.mask[i] = ~0U;
-      packet.ray.flags[i] = 0;
-      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+      active[i] = i < rays.size() && ray.max_distance_m >= 0 ? -1 : 0;
+      Search& search = packet.searches[i];
+      search.o = ray.origin_W.cast<double>();
+      search.d = ray.direction_W.cast<double>();
+      search.from = static_cast<double>(ray.min_distance_m);
+      search.to = static_cast<double>(ray.max_distance_m);
+      query.ray.org_x[i] = ray.origin_W.x();
+      query.ray.org_y[i] = ray.origin_W.y();
+      query.ray.org_z[i] = ray.origin_W.z();
+      query.ray.dir_x[i] = ray.direction_W.x();
+      query.ray.dir_y[i] = ray.direction_W.y();
+      query.ray.dir_z[i] = ray.direction_W.z();
+      query.ray.tnear[i] = std::max(0.0F, ray.min_distance_m - widening(ray.min_distance_m));
+      query.ray.tfar[i] = ray.max_distance_m + widening(ray.max_distance_m);
+      query.ray.time[i] = 0;
+      query.ray.mask[i] = ~0U;
+      query.ray.id[i] = static_cast<unsigned>(i);
+      query.ray.flags[i] = 0;
+      query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect8(active.data(), tree, &context, &packet);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      // A miss leaves geometry and primitive invalid alike.
-      const bool missed = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID;
-      hits[i].object = missed ? Hit::kNone : packet.hit.primID[i];
-      hits[i].distance_m = packet.ray.tfar[i];
-      if (!missed) __builtin_prefetch(&facets[packet.hit.primID[i]]);
+    rtcInitIntersectContext(&packet.context);
+    rtcIntersect8(active.data(), tree, &packet.context, &query);
+    for (const Search& search : packet.searches) {
+      if (search.count > 0) __builtin_prefetch(&facets[search.candidates[0]]);
     }
-  }
-
-  /// Turns the triangle and Embree's distance, as cast_packet leaves them, into the full answer.
-  void finish(const Ray& ray, RayHit& hit) const {
-    if (!hit.valid()) {
-      hit = {};
-      return;
-    }
-    const Facet& facet = facets[hit.object];
-    hit = {plane_distance<float>(facet, ray.origin_W, ray.direction_W, hit.distance_m),
-           facet.normal_W, facet.reflectivity, facet.object};
+    for (std::size_t i = 0; i < rays.size(); ++i) found[i] = packet.searches[i].first(facets);
   }
 };
+
+double distance_along(const Vec3& o, const Vec3& d, const std::array<Vec3f, 3>& corners) {
+  const Vec3 a = corners[0].cast<double>() - o;
+  const Vec3 b = corners[1].cast<double>() - o;
+  const Vec3 c = corners[2].cast<double>() - o;
+  const Vec3 normal = (b - a).cross(c - a);
+  const Vec3 extent = Vec3(d.dot(a), d.dot(b), d.dot(c)) / d.squaredNorm();
+  const double t = normal.dot(a) / normal.dot(d);
+  // Edge-on, where the plane's distance has no digits, it still lies between the corners.
+  return std::min(extent.maxCoeff(), std::max(extent.minCoeff(), t));
+}
 
 Scene::Scene(const worlds::World& world, Build build)
     : embree_(std::make_unique<Embree>(world, build)) {}
 Scene::~Scene() = default;
 
 Hit Scene::cast(const Vec3& origin_W, const Vec3& direction_W, double max_distance_m) const {
-  RTCRayHit query{};
-  query.ray.org_x = static_cast<float>(origin_W.x());
-  query.ray.org_y = static_cast<float>(origin_W.y());
-  query.ray.org_z = static_cast<float>(origin_W.z());
-  query.ray.dir_x = static_cast<float>(direction_W.x());
-  query.ray.dir_y = static_cast<float>(direction_W.y());
-  query.ray.dir_z = static_cast<float>(direction_W.z());
-  query.ray.tfar = static_cast<float>(max_distance_m);
-  query.ray.mask = ~0U;
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(embree_->tree(), &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  const Facet& facet = embree_->facets[query.hit.primID];
+  const Ray ray{origin_W.cast<float>(), direction_W.cast<float>(), 0,
+                static_cast<float>(max_distance_m)};
+  Meeting meeting;
+  embree_->cast_packet(embree_->tree(), {&ray, 1}, {&meeting, 1});
+  if (meeting.triangle == Hit::kNone) return {};
+  const Facet& facet = embree_->facets[meeting.triangle];
   Hit hit;
-  hit.distance_m =
-      plane_distance<double>(facet, origin_W, direction_W, static_cast<double>(query.ray.tfar));
+  hit.distance_m = meeting.distance;
   hit.normal_W = facet.normal_W.cast<double>().normalized();
   if (hit.normal_W.dot(direction_W) > 0) hit.normal_W = -hit.normal_W;
-  hit.triangle = query.hit.primID;
+  hit.triangle = meeting.triangle;
   hit.object = facet.object;
   return hit;
 }
 
 void Scene::cast(std::span<const Ray> rays, std::span<RayHit> hits) const {
   const RTCScene tree = embree_->tree();
-  for (std::size_t i = 0; i < rays.size(); i += kPacket) {
-    const std::size_t count = std::min(kPacket, rays.size() - i);
-    embree_->cast_packet(tree, rays.subspan(i, count), hits.subspan(i, count));
+  std::array<Meeting, kPacket> met;
+  for (std::size_t first = 0; first < rays.size(); first += kPacket) {
+    const std::size_t count = std::min(kPacket, rays.size() - first);
+    embree_->cast_packet(tree, rays.subspan(first, count), std::span(met).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      RayHit& hit = hits[first + i];
+      hit = {};
+      if (met[i].triangle == Hit::kNone) continue;
+      const Facet& facet = embree_->facets[met[i].triangle];
+      hit = {static_cast<float>(met[i].distance), facet.normal_W, facet.reflectivity, facet.object};
+    }
   }
-  // In a second pass, when the facets have arrived in the cache.
-  for (std::size_t i = 0; i < rays.size(); ++i) embree_->finish(rays[i], hits[i]);
 }
 
 double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m,
@@ -267,8 +331,7 @@ double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m,
   query.y = static_cast<float>(p_W.y());
   query.z = static_cast<float>(p_W.z());
   query.time = 0;
-  // Widened by the rounding of the centre to float.
-  query.radius = static_cast<float>(max_distance_m) * 1.000001F + 1e-5F;
+  query.radius = static_cast<float>(max_distance_m) + widening(static_cast<float>(max_distance_m));
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   rtcPointQuery(embree_->tree(), &query, &context, nullptr, &nearest);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -41,11 +42,17 @@ struct RayHit {
   [[nodiscard]] bool valid() const { return object != Hit::kNone; }
 };
 
+/// How far along the ray o + t d a triangle lies that it meets, in lengths of d.
+double distance_along(const Vec3& o, const Vec3& d, const std::array<Vec3f, 3>& corners);
+
 /// Ray casts and distances against the triangles of one world. Constant once built: any number of
 /// threads may ask.
 ///
-/// Embree answers which triangle a ray meets; the distance comes from that triangle's plane in our
-/// own arithmetic, because Embree's reciprocals differ in the last bits between CPU vendors.
+/// Embree answers which triangles a ray meets. That is the same on every host: its robust mode
+/// searches every box that the ray may touch, and on which side of an edge the ray passes it
+/// decides by products and sums alone. Its distances are not, for they come from reciprocals that
+/// differ between CPU vendors: they only bound the search, with a margin, and the first triangle is
+/// the one that is nearest by distance_along, of equally near ones the first in the mesh.
 class Scene {
  public:
   /// When the tree of the triangles is built, seconds for a large world: before the constructor
@@ -56,7 +63,8 @@ class Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  /// First surface along a unit direction, at most `max_distance_m` away.
+  /// First surface along a unit direction, at most `max_distance_m` away. Both are rounded to
+  /// single precision first.
   [[nodiscard]] Hit cast(const Vec3& origin_W, const Vec3& direction_W,
                          double max_distance_m) const;
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "files/files.h"
 
 namespace arex::worlds {
 namespace {
@@ -44,12 +44,7 @@ class OutputFile {
   }
   void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
 
-  void close() {
-    std::ofstream stream(file_, std::ios::binary);
-    stream.write(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
-    stream.close();
-    if (!stream) throw std::runtime_error("cannot write " + file_.string());
-  }
+  void close() { write_atomically(file_, bytes_); }
 
  private:
   std::filesystem::path file_;
@@ -261,6 +256,8 @@ void write_map2d(const World& world, const ExportConfig& config, const FreeSpace
 void export_world(const World& world, const ExportConfig& config,
                   const std::filesystem::path& directory) {
   std::filesystem::create_directories(directory);
+  std::error_code none;
+  if (world.terrain.columns == 0) std::filesystem::remove(directory / kTerrainFile, none);
   write_ply(world, directory / "mesh.ply");
   write_mjcf(world, directory / "world.xml");
   const OccupancyGrid occupancy =

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <string_view>
 
 #include "worlds/occupancy.h"
 
@@ -22,9 +24,12 @@ struct ExportConfig {
   }
 };
 
-/// Writes all of the below into a directory, which is created: mesh.ply, world.xml, terrain.hf (if
-/// the world has a height field), map.bt, map2d.pgm, map2d.yaml.
-/// @throws std::runtime_error naming the file that cannot be written; so do the others.
+/// What export_world() writes; terrain.hf only if the world has a height field.
+inline constexpr std::array<std::string_view, 6> kExportedFiles{
+    "mesh.ply", "world.xml", "terrain.hf", "map.bt", "map2d.pgm", "map2d.yaml"};
+
+/// Writes all of the below into a directory, which is created; those of an older world go.
+/// @throws DiskError naming the file that cannot be written; so do the others.
 void export_world(const World& world, const ExportConfig& config,
                   const std::filesystem::path& directory);
 

@@ -7,8 +7,8 @@
 
 namespace arex {
 
-/// Writes points as a binary PCD of x, y, z (float, m) by PCL. The file appears whole or not at
-/// all: who is killed meanwhile leaves the one before. @return whether it could be written.
-[[nodiscard]] bool write_pcd(const std::filesystem::path& file, std::span<const Vec3f> points);
+/// Writes points as a binary PCD of x, y, z (float, m). The file appears whole or not at all: who
+/// is killed meanwhile leaves the one before. @throws DiskError.
+void write_pcd(const std::filesystem::path& file, std::span<const Vec3f> points);
 
 }  // namespace arex

@@ -170,6 +170,6 @@ double GlobalMap::known_volume() const {
   return static_cast<double>(known_voxels_) * std::pow(resolution_m_, 3);
 }
 
-bool GlobalMap::write_octomap(const std::filesystem::path& file) const { return tree_.write(file); }
+void GlobalMap::write_octomap(const std::filesystem::path& file) const { tree_.write(file); }
 
 }  // namespace arex

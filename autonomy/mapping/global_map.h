@@ -34,8 +34,8 @@ class GlobalMap {
   /// Volume known so far, m^3.
   [[nodiscard]] double known_volume() const;
 
-  /// OctoMap's binary format. @return whether it could be written.
-  [[nodiscard]] bool write_octomap(const std::filesystem::path& file) const;
+  /// OctoMap's binary format. @throws DiskError.
+  void write_octomap(const std::filesystem::path& file) const;
 
  private:
   struct alignas(64) Brick {  // each mask a cache line

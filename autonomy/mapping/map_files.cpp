@@ -1,8 +1,9 @@
 #include "mapping/map_files.h"
 
-#include <fstream>
+#include <sstream>
 #include <string>
-#include <vector>
+
+#include "files/files.h"
 
 namespace arex {
 namespace {
@@ -16,24 +17,21 @@ char to_grey(std::int8_t state) {
 
 }  // namespace
 
-bool write_map_2d(const OccupancyMap2D& map, const std::filesystem::path& folder,
+void write_map_2d(const OccupancyMap2D& map, const std::filesystem::path& folder,
                   const std::string& name) {
-  std::ofstream pgm(folder / (name + ".pgm"), std::ios::binary);
-  pgm << "P5\n" << map.width << ' ' << map.height << "\n255\n";
-  std::vector<char> row(static_cast<std::size_t>(map.width));
+  std::string pgm =
+      "P5\n" + std::to_string(map.width) + " " + std::to_string(map.height) + "\n255\n";
   for (int y = map.height - 1; y >= 0; --y) {
-    for (int x = 0; x < map.width; ++x) row[static_cast<std::size_t>(x)] = to_grey(map.at({x, y}));
-    pgm.write(row.data(), map.width);
+    for (int x = 0; x < map.width; ++x) pgm += to_grey(map.at({x, y}));
   }
-  pgm.close();
-  std::ofstream yaml(folder / (name + ".yaml"));
+  write_atomically(folder / (name + ".pgm"), pgm);
+  std::ostringstream yaml;
   yaml.precision(17);
   yaml << "image: " << name << ".pgm\n"
        << "resolution: " << map.resolution << "\n"
        << "origin: [" << map.origin.x() << ", " << map.origin.y() << ", 0]\n"
        << "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
-  yaml.close();
-  return pgm.good() && yaml.good();
+  write_atomically(folder / (name + ".yaml"), yaml.str());
 }
 
 }  // namespace arex

@@ -44,9 +44,4 @@ void Mapper::integrate(const RegisteredDepth& depth) {
   local_.add_frame(*rays, LocalGrid::FrameKind::kDepth, depth.image->stamp);
 }
 
-bool Mapper::write(const std::filesystem::path& folder) const {
-  const bool tree = global_.write_octomap(folder / "map.bt");
-  return write_map_2d(global_.occupancy_2d(), folder, "map2d") && tree;
-}
-
 }  // namespace arex

@@ -31,8 +31,6 @@ class Mapper {
   [[nodiscard]] std::shared_ptr<const GridSnapshot> snapshot() { return local_.snapshot(); }
   [[nodiscard]] const GlobalMap& global() const { return global_; }
   [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return global_.occupancy_2d(); }
-  /// map.bt, map2d.pgm and map2d.yaml. @return whether all could be written.
-  [[nodiscard]] bool write(const std::filesystem::path& folder) const;
 
  private:
   [[nodiscard]] std::shared_ptr<RayCaster> free_rays();

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <deque>
-#include <fstream>
+#include <sstream>
 #include <vector>
+
+#include "files/files.h"
 
 namespace arex {
 namespace {
@@ -210,9 +212,10 @@ int StateTree::state(const Vec3& p) const {
 
 std::size_t StateTree::nodes() const { return tree_->size(); }
 
-bool StateTree::write(const std::filesystem::path& file) const {
-  std::ofstream stream(file, std::ios::binary);
-  return stream && tree_->writeBinaryConst(stream) && stream.flush();
+void StateTree::write(const std::filesystem::path& file) const {
+  std::ostringstream bytes;
+  tree_->writeBinaryConst(bytes);
+  write_atomically(file, bytes.view());
 }
 
 }  // namespace arex

@@ -32,8 +32,8 @@ class StateTree {
   /// -1 unknown, 0 free, 1 occupied; asked of the tree.
   [[nodiscard]] int state(const Vec3& p) const;
   [[nodiscard]] std::size_t nodes() const;
-  /// OctoMap's binary format (.bt). @return whether it could be written.
-  [[nodiscard]] bool write(const std::filesystem::path& file) const;
+  /// OctoMap's binary format (.bt). @throws DiskError.
+  void write(const std::filesystem::path& file) const;
 
  private:
   class Tree;

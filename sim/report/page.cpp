@@ -2,9 +2,7 @@
 
 #include <array>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "report/payload.h"
 #include "report/viewer.h"
@@ -45,17 +43,6 @@ std::string number_text(double value, int digits) {
 std::string percent_text(double share) {
   if (share < 1 && share > 0.9995) return "> 99.9 %";
   return number_text(100 * share) + " %";
-}
-
-void write_page(const std::filesystem::path& file, const std::string& html) {
-  const std::filesystem::path part = file.string() + ".partial";
-  {
-    std::ofstream stream(part, std::ios::binary);
-    stream << html;
-    stream.close();
-    if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
-  }
-  std::filesystem::rename(part, file);
 }
 
 }  // namespace arex::sim

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -25,8 +24,5 @@ std::string number_text(double value, int digits = 3);
 
 /// A share in percent. What is not the whole is never rounded to 100 %.
 std::string percent_text(double share);
-
-/// Replaces the file atomically. @throws std::runtime_error naming it when the disk refuses.
-void write_page(const std::filesystem::path& file, const std::string& html);
 
 }  // namespace arex::sim

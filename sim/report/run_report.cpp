@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "files/files.h"
 #include "report/map_picture.h"
 #include "report/page.h"
 #include "report/payload.h"
@@ -262,7 +263,7 @@ std::string run_report_html(const RunRecord& run) {
 bool write_run_report(const std::filesystem::path& folder, const std::string& title) {
   RunRecord run = read_run(folder, kMaxReportPoints);
   run.title = title;
-  write_page(folder / "report.html", run_report_html(run));
+  write_atomically(folder / "report.html", run_report_html(run));
   return run.summary.has_value();
 }
 

@@ -1,18 +1,30 @@
 #pragma once
 
-#include <cstdio>
+#include <array>
+#include <atomic>
 #include <filesystem>
-#include <memory>
+#include <functional>
+#include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "exploration/explorer.h"
+#include "files/files.h"
 #include "mapping/mapper.h"
 #include "math/pose.h"
 #include "messages/events.h"
 
 namespace arex::sim {
+
+/// Every file that a run, its report or a sweep writes into a run folder: what an older run in the
+/// same folder may have left. resolved.yaml stands last: it goes last, too.
+inline constexpr std::array<std::string_view, 19> kRunFiles{
+    "summary.json", "truth.tum",  "estimate.tum",  "coverage.csv",       "events.csv",
+    "timing.csv",   "cloud.pcd",  "map.bt",        "map2d.pgm",          "map2d.yaml",
+    "report.html",  "flight.csv", "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
+    "host.json",    "output.txt", "failure.json",  "resolved.yaml"};
 
 /// One row of flight.csv: what a report plots against time. Not a number: an empty cell.
 struct FlightRow {
@@ -35,12 +47,14 @@ struct CloudGrowth {
   std::size_t points = 0;
 };
 
-/// The run folder. Everything but the summary is written while flying, so that a killed run leaves
-/// what it had; the summary is written last and atomically: a folder without it is unfinished.
-/// @throws std::runtime_error naming the file when the disk refuses.
+/// What a run writes into its folder. Everything but the summary is written while flying, so that a
+/// killed run leaves what it had; the summary is written last and atomically: a folder without it
+/// is unfinished. A disk that refuses does not end the flight by an exception: each file that could
+/// not be written is named in failures(), and the others are still written.
 class Recorder {
  public:
-  /// Creates the folder, removes an older run's files of the contract and writes resolved.yaml.
+  /// Creates the folder if need be, removes an older run's files and writes resolved.yaml.
+  /// @throws DiskError.
   Recorder(std::filesystem::path directory, const std::string& resolved_yaml);
   ~Recorder();
 
@@ -54,28 +68,30 @@ class Recorder {
   void flush();
 
   /// cloud.pcd and cloud_growth.csv, each replaced atomically. May be called from a job.
-  void write_cloud(const std::vector<Vec3f>& points_O,
-                   const std::vector<CloudGrowth>& growth) const;
+  void write_cloud(const std::vector<Vec3f>& points_O, const std::vector<CloudGrowth>& growth);
   /// map.bt, map2d.pgm and map2d.yaml.
-  void write_maps(const Mapper& mapper) const;
-  /// A whole file of the folder, replaced atomically.
-  void write_file(const std::string& name, const std::string& content) const;
+  void write_maps(const Mapper& mapper);
+  /// A whole file of the folder, replaced atomically. @pre name is one of kRunFiles.
+  void write_file(const std::string& name, const std::string& content);
   /// Flushes everything, then writes summary.json.
   void write_summary(const nlohmann::ordered_json& summary);
 
+  /// What the disk refused so far, a line for each file. May be called while a job writes.
+  [[nodiscard]] std::vector<std::string> failures() const;
+  [[nodiscard]] bool failed() const { return failed_; }
   [[nodiscard]] const std::filesystem::path& directory() const { return directory_; }
 
  private:
-  using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
-  File open(const char* name, const std::string& header);
-  void check(std::FILE* file, const char* name);
+  /// Does it, and remembers what the disk said against it.
+  void attempt(const std::function<void()>& write);
+  void append(GrowingFile& file, std::string_view text);
+  GrowingFile open(const char* name, const std::string& header);
 
   std::filesystem::path directory_;
-  File truth_;
-  File estimate_;
-  File events_;
-  File flight_;
-  File decisions_;
+  GrowingFile truth_, estimate_, events_, flight_, decisions_;
+  std::vector<std::string> failures_;
+  std::atomic<bool> failed_ = false;
+  mutable std::mutex mutex_;  ///< of failures_: the cloud is written in a job
 };
 
 }  // namespace arex::sim

@@ -3,8 +3,6 @@
 #include <lz4frame.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <exception>
 #include <stdexcept>
 
@@ -52,6 +50,8 @@ class Header {
   RosBytes bytes_;
 };
 
+std::filesystem::path active_name(std::filesystem::path path) { return path += ".active"; }
+
 void put_record(RosBytes& out, const Header& header, std::string_view data) {
   out.put(header.view());
   out.put(data);
@@ -60,17 +60,13 @@ void put_record(RosBytes& out, const Header& header, std::string_view data) {
 }  // namespace
 
 RosBag::RosBag(std::filesystem::path path, BagCompression compression)
-    : path_(std::move(path)),
-      active_path_(path_.string() + ".active"),
-      compression_(compression),
-      file_(std::fopen(active_path_.c_str(), "wb"), &std::fclose) {
-  if (!file_) fail();
+    : path_(std::move(path)), compression_(compression), file_(active_name(check_writable(path_))) {
   write_out(kMagic);
-  write_file_header(0);
+  write_out(file_header(0).view());
 }
 
 RosBag::~RosBag() {
-  if (!file_) return;
+  if (!file_.is_open()) return;
   try {
     finish_chunk();
   } catch (const std::exception&) {
@@ -121,7 +117,7 @@ void RosBag::finish_chunk() {
   ++chunk_count_;
   chunk_.clear();
   write_out(out.view());
-  if (std::fflush(file_.get()) != 0) fail();
+  file_.flush();
 }
 
 void RosBag::put_index(RosBytes& out, std::uint64_t chunk_position) {
@@ -168,7 +164,7 @@ std::string RosBag::compressed_chunk() const {
   const std::size_t size =
       LZ4F_compressFrame(out.data(), out.size(), chunk_.view().data(), chunk_.size(), &preferences);
   if (LZ4F_isError(size)) {
-    throw std::runtime_error(active_path_.string() + ": " + LZ4F_getErrorName(size));
+    throw std::runtime_error(file_.path().string() + ": " + LZ4F_getErrorName(size));
   }
   out.resize(size);
   return out;
@@ -182,13 +178,12 @@ void RosBag::close() {
     if (connection.written) write_out(connection.record.view());
   }
   write_out(chunk_infos_.view());
-  if (std::fseek(file_.get(), static_cast<long>(kMagic.size()), SEEK_SET) != 0) fail();
-  write_file_header(index_position);
-  if (std::fclose(file_.release()) != 0) fail();
-  if (std::rename(active_path_.c_str(), path_.c_str()) != 0) fail();
+  file_.flush();
+  file_.overwrite_beginning(std::string(kMagic).append(file_header(index_position).view()));
+  file_.finish_as(path_);
 }
 
-void RosBag::write_file_header(std::uint64_t index_position) {
+RosBytes RosBag::file_header(std::uint64_t index_position) const {
   const auto connection_count =
       static_cast<std::uint32_t>(std::ranges::count(connections_, true, &Connection::written));
   Header header(Op::kFileHeader);
@@ -197,22 +192,16 @@ void RosBag::write_file_header(std::uint64_t index_position) {
       .field("chunk_count", chunk_count_);
   RosBytes record;
   put_record(record, header, std::string(kFileHeaderSize - header.view().size(), ' '));
-  write_out(record.view());
+  return record;
 }
 
 void RosBag::write_out(std::string_view bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail();
+  file_.append(bytes);
   position_ += bytes.size();
 }
 
 void RosBag::require_open() const {
-  if (!file_) throw std::runtime_error(path_.string() + ": the bag is closed");
-}
-
-void RosBag::fail() {
-  const int error = errno;
-  file_.reset();
-  throw std::runtime_error(active_path_.string() + ": cannot be written: " + std::strerror(error));
+  if (!file_.is_open()) throw std::runtime_error(path_.string() + ": the bag is closed");
 }
 
 }  // namespace arex::sim

@@ -1,13 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "files/files.h"
 #include "run/ros_bytes.h"
 #include "run/ros_messages.h"
 
@@ -25,8 +24,8 @@ enum class BagCompression { kNone, kLz4 };
 /// As `rosbag record` does, the file is FILE.active while it grows; close() writes the index and
 /// renames it. A killed run leaves FILE.active with every whole chunk (`rosbag reindex` repairs
 /// it). Same calls, same bytes. One thread at a time.
-/// All functions throw std::runtime_error naming the file when the disk refuses; no call but the
-/// destructor is of use after that.
+/// All functions throw DiskError when the disk refuses; no call but the destructor is of use after
+/// that.
 class RosBag {
  public:
   RosBag(std::filesystem::path path, BagCompression compression);
@@ -55,18 +54,16 @@ class RosBag {
   };
 
   void write_out(std::string_view bytes);
-  void write_file_header(std::uint64_t index_position);
+  [[nodiscard]] RosBytes file_header(std::uint64_t index_position) const;
   void finish_chunk();
   /// Appends the open chunk's index records to `out` and its info record to chunk_infos_.
   void put_index(RosBytes& out, std::uint64_t chunk_position);
   [[nodiscard]] std::string compressed_chunk() const;
   void require_open() const;
-  [[noreturn]] void fail();
 
   std::filesystem::path path_;
-  std::filesystem::path active_path_;
   BagCompression compression_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  GrowingFile file_;
   std::uint64_t position_ = 0;  ///< bytes written
   std::vector<Connection> connections_;
   RosBytes chunk_;        ///< the open chunk, uncompressed

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "files/files.h"
 #include "sensors/picture.h"
 
 namespace arex::sim {
@@ -15,9 +16,13 @@ void save_png(const Picture& picture, const std::filesystem::path& file) {
   image.width = static_cast<png_uint_32>(picture.width);
   image.height = static_cast<png_uint_32>(picture.height);
   image.format = PNG_FORMAT_RGB;
-  if (png_image_write_to_file(&image, file.c_str(), 0, picture.rgb.data(), 0, nullptr) == 0) {
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string bytes(size, '\0');
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, picture.rgb.data(), 0, nullptr) ==
+      0) {
     throw std::runtime_error(file.string() + ": " + image.message);
   }
+  write_atomically(file, std::string_view(bytes).substr(0, size), false);
 }
 
 }  // namespace arex::sim

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
+#include "files/files.h"
 #include "mapping/frame_rays.h"
 #include "mapping/map_files.h"
 #include "support/temporary_folder.h"
@@ -87,7 +88,7 @@ TEST(GlobalMap, HasOctoMapsStatesAfterTheSameHitsAndMisses) {
   oracle.prune();
   EXPECT_EQ(map.tree().nodes(), oracle.size());
   TemporaryFolder folder;
-  ASSERT_TRUE(map.write_octomap(folder / "map.bt"));
+  map.write_octomap(folder / "map.bt");
   octomap::OcTree read(0.5);
   ASSERT_TRUE(read.readBinary((folder / "map.bt").string()));
   EXPECT_DOUBLE_EQ(read.getResolution(), kResolution);
@@ -327,7 +328,7 @@ TEST(MapFiles, AreReadBack) {
   map.height = 3;
   map.cells = {-1, 0, 1, 0, -1, 0, 0, 0, 1, 1, 1, -1, -1, 0, 0};
   TemporaryFolder folder;
-  ASSERT_TRUE(write_map_2d(map, folder.path(), "map2d"));
+  write_map_2d(map, folder.path(), "map2d");
   const std::string pgm = read_text(folder / "map2d.pgm");
   const std::string header = "P5\n5 3\n255\n";
   ASSERT_EQ(pgm.substr(0, header.size()), header);
@@ -345,7 +346,7 @@ TEST(MapFiles, AreReadBack) {
   EXPECT_NE(yaml.find("image: map2d.pgm\n"), std::string::npos);
   EXPECT_NE(yaml.find("resolution: 0.1"), std::string::npos);
   EXPECT_NE(yaml.find("origin: [-3.1"), std::string::npos);
-  EXPECT_FALSE(write_map_2d(map, folder / "missing", "map2d"));
+  EXPECT_THROW(write_map_2d(map, folder / "missing", "map2d"), DiskError);
 }
 
 }  // namespace

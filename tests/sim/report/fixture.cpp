@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "files/files.h"
 #include "report/comparison_report.h"
 #include "report/page.h"
 #include "report/run_report.h"
@@ -21,7 +22,7 @@ int main(int argc, char** argv) {
     test::write_synthetic_run(folder / name, {});
     if (name == std::string("old")) std::filesystem::remove(folder / name / "cloud_growth.csv");
     const RunRecord run = read_run(folder / name, kMaxReportPoints);
-    write_page(folder / name / "report.html", run_report_html(run));
+    write_atomically(folder / name / "report.html", run_report_html(run));
   }
   test::write_synthetic_sweep(folder / "sweep");
   test::write_synthetic_hypercube(folder / "cube");
@@ -29,8 +30,8 @@ int main(int argc, char** argv) {
   test::write_synthetic_failures(folder / "none", 0);
   for (const char* name : {"sweep", "cube", "few", "none"}) {
     const std::filesystem::path sweep = folder / name;
-    write_page(sweep / "report.html",
-               comparison_report_html(read_results({sweep}), "Sweep", sweep));
+    write_atomically(sweep / "report.html",
+                     comparison_report_html(read_results({sweep}), "Sweep", sweep));
   }
   return 0;
 }

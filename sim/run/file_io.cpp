@@ -1,7 +1,8 @@
-#include "sweep/file_io.h"
+#include "run/file_io.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -10,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace arex::sim {
@@ -18,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const fs::path& path) {
-  throw DiskError("cannot be written", path, std::error_code(errno, std::generic_category()));
+  throw DiskError(path, "cannot be written", {errno, std::generic_category()});
 }
 
 /// A file descriptor that closes itself and is not inherited.
@@ -58,29 +60,11 @@ void sync_path(const fs::path& path, int flags) {
 
 }  // namespace
 
-bool DiskError::disk_full() const {
-  return code() == std::errc::no_space_on_device || code().value() == EDQUOT;
-}
-
 std::string read_file(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-void write_atomically(const fs::path& file, const std::string& text, bool durable) {
-  fs::path temporary = file;
-  temporary += "." + std::to_string(getpid()) + ".partial";
-  const bool written = [&] {
-    const Descriptor out(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    return out.valid() && write_all(out.value(), text) && (!durable || fsync(out.value()) == 0);
-  }();
-  if (written && rename(temporary.c_str(), file.c_str()) == 0) return;
-  const int error = errno;
-  unlink(temporary.c_str());
-  errno = error;
-  fail(file);
 }
 
 bool append_line(const fs::path& file, const std::string& line) {
@@ -111,7 +95,23 @@ void remove_folder(const fs::path& folder) {
     if (!error) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  throw DiskError("cannot be removed", folder, error);
+  throw DiskError(folder, "cannot be removed", error);
+}
+
+OutputFolder::OutputFolder(fs::path path) : path_(std::move(path)) {
+  std::error_code error;
+  for (fs::path folder = fs::absolute(path_).lexically_normal();
+       !fs::exists(fs::symlink_status(folder, error)); folder = folder.parent_path()) {
+    if (folder.has_filename()) created_.push_back(folder);
+  }
+  fs::create_directories(path_, error);
+  if (!error && !fs::is_directory(path_)) error = std::make_error_code(std::errc::not_a_directory);
+  if (error) throw DiskError(path_, "cannot be a folder to write", error);
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code none;
+  for (const fs::path& folder : created_) fs::remove(folder, none);
 }
 
 bool accepts_writes(const fs::path& folder) {
@@ -125,19 +125,49 @@ bool accepts_writes(const fs::path& folder) {
   return accepted;
 }
 
-FileLock::FileLock(const fs::path& file, Mode mode) : file_(file), mode_(mode) {
-  descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) fail(file);
+std::string host_name() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return name.data();
 }
 
-FileLock::~FileLock() { close(descriptor_); }
+FileLock::FileLock(const fs::path& file, Mode mode) : file_(file), mode_(mode) { open_file(); }
+
+FileLock::~FileLock() { close_file(); }
+
+void FileLock::open_file() {
+  close_file();
+  // What stands there and is no lock of ours must not be waited for, followed or written to.
+  descriptor_ = open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+  struct stat status {};
+  if (descriptor_ < 0) fail(file_);
+  if (fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
+  close_file();
+  errno = EEXIST;
+  fail(file_);
+}
+
+void FileLock::close_file() {
+  if (descriptor_ >= 0) close(std::exchange(descriptor_, -1));
+}
+
+bool FileLock::in_place() const {
+  struct stat held {
+  }, named{};
+  return fstat(descriptor_, &held) == 0 && stat(file_.c_str(), &named) == 0 &&
+         held.st_ino == named.st_ino && held.st_dev == named.st_dev;
+}
 
 bool FileLock::take(double patience_s) {
   constexpr auto kPause = std::chrono::milliseconds(50);
   const int mode = mode_ == Mode::kShared ? LOCK_SH : LOCK_EX;
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience_s);
   for (;;) {
-    if (flock(descriptor_, mode | LOCK_NB) == 0 || errno != EWOULDBLOCK) return true;
+    if (flock(descriptor_, mode | LOCK_NB) == 0 || errno != EWOULDBLOCK) {
+      if (in_place()) return true;
+      open_file();
+      continue;
+    }
     if (std::chrono::steady_clock::now() >= end) return false;
     std::this_thread::sleep_for(kPause);
   }
@@ -145,10 +175,16 @@ bool FileLock::take(double patience_s) {
 
 std::string FileLock::holder() const { return read_file(file_); }
 
-void FileLock::sign(const std::string& text) {
-  // A full disk must not keep a sweep from saying so itself.
+void FileLock::sign() {
+  const std::string text = "process " + std::to_string(getpid()) + " on " + host_name();
+  // A full disk must not keep its holder from saying so itself.
   if (ftruncate(descriptor_, 0) != 0 || pwrite(descriptor_, text.data(), text.size(), 0) < 0)
     return;
+}
+
+void FileLock::remove() {
+  unlink(file_.c_str());
+  close_file();
 }
 
 }  // namespace arex::sim

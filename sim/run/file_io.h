@@ -2,24 +2,16 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
-/// Small files that are whole or not there. All functions that write @throw DiskError.
+#include "files/files.h"
+
+/// Folders that others read and write at the same time. What writes files of the disk stands in
+/// files/files.h. All functions that write @throw DiskError.
 namespace arex::sim {
-
-/// The disk refused; what() names the file and the reason.
-class DiskError : public std::filesystem::filesystem_error {
- public:
-  using std::filesystem::filesystem_error::filesystem_error;
-  [[nodiscard]] bool disk_full() const;
-};
 
 /// The whole text of a file; empty if it cannot be read.
 std::string read_file(const std::filesystem::path& file);
-
-/// Writes a file of its own and renames it into place: readers see the old text or the new one.
-/// @param durable also after a power cut; otherwise sync_folder() sees to that
-void write_atomically(const std::filesystem::path& file, const std::string& text,
-                      bool durable = true);
 
 /// Appends one line in one write: lines of several writers do not mix. @return whether it worked.
 bool append_line(const std::filesystem::path& file, const std::string& line);
@@ -32,11 +24,29 @@ void sync_names(const std::filesystem::path& folder);
 /// Removes a folder and what is in it, also while a dying process still writes there.
 void remove_folder(const std::filesystem::path& folder);
 
+/// A folder that is made for what a command will write, and goes again if nothing was.
+class OutputFolder {
+ public:
+  /// Creates what is missing of the path. @throws DiskError.
+  explicit OutputFolder(std::filesystem::path path);
+  /// Removes of what it created what is empty.
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  std::vector<std::filesystem::path> created_;  ///< from the innermost on
+};
+
 /// Whether a small file can be written in the folder.
 bool accepts_writes(const std::filesystem::path& folder);
 
+std::string host_name();
+
 /// A lock of the whole file between processes and, where the file system says so, hosts. Ends with
-/// the object or the process.
+/// the object or the process, so that no dead process ever holds one.
 class FileLock {
  public:
   enum class Mode { kShared, kExclusive };
@@ -50,10 +60,17 @@ class FileLock {
   bool take(double patience_s = 0);
   /// What the holder wrote about itself.
   [[nodiscard]] std::string holder() const;
-  /// Writes who holds it; of an exclusive lock.
-  void sign(const std::string& text);
+  /// Writes that this process holds it; of an exclusive lock.
+  void sign();
+  /// Takes its file away and ends the lock; of an exclusive lock that is held.
+  void remove();
 
  private:
+  void open_file();
+  void close_file();
+  /// Whether the file still has its name: its last holder may have taken it away.
+  [[nodiscard]] bool in_place() const;
+
   std::filesystem::path file_;
   Mode mode_;
   int descriptor_ = -1;

@@ -1,4 +1,3 @@
-#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,8 +10,10 @@
 #include <set>
 
 #include "app/commands.h"
+#include "app/host.h"
+#include "app/interrupts.h"
+#include "run/file_io.h"
 #include "run/foreign_json.h"
-#include "sweep/file_io.h"
 #include "sweep/slurm.h"
 #include "sweep/supervisor.h"
 #include "sweep/sweep_file.h"
@@ -30,12 +31,6 @@ constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
 // A look whether someone is at work holds a lock for a moment.
 constexpr double kPatience_s = 2;
 constexpr double kTaskPatience_s = 60;
-
-int cores() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  return sched_getaffinity(0, sizeof set, &set) == 0 ? std::max(1, CPU_COUNT(&set)) : 1;
-}
 
 std::string clock_text(double seconds) {
   std::array<char, 32> text{};
@@ -106,7 +101,7 @@ int dry_run(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
 // Empty also where there is no Slurm to ask.
 std::set<std::string> queued_or_none(const sim::SweepFolder& folder) {
   try {
-    return sim::queued_runs(folder);
+    return sim::queue_of(folder).runs;
   } catch (const sim::SlurmError&) {
     return {};
   }
@@ -120,7 +115,7 @@ bool at_work(const sim::SweepFolder& folder) {
       if (!sim::FileLock(folder.root() / name, sim::FileLock::Mode::kExclusive).take()) return true;
     }
     return false;
-  } catch (const sim::DiskError&) {
+  } catch (const DiskError&) {
     return true;  // somebody else's folder: one can only look
   }
 }
@@ -153,8 +148,8 @@ int status(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
 
 void write_tables(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
   const sim::SweepTables tables = sim::sweep_tables(plan, folder);
-  sim::write_atomically(folder.root() / "sweep_host.csv", tables.host);
-  sim::write_atomically(folder.root() / "sweep.csv", tables.results);
+  write_atomically(folder.root() / "sweep_host.csv", tables.host);
+  write_atomically(folder.root() / "sweep.csv", tables.results);
 }
 
 void warn_of_another_build(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
@@ -164,11 +159,10 @@ void warn_of_another_build(const sim::SweepPlan& plan, const sim::SweepFolder& f
                folder.root().c_str());
 }
 
-std::filesystem::path made_folder(const std::string& out) {
-  std::error_code error;
-  std::filesystem::create_directories(out, error);
-  if (error) throw ConfigError(out + ": " + error.message() + ", expected a folder to write");
-  return std::filesystem::canonical(out);
+// What is swept must not stand in the middle of something else.
+void expect_no_run(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / "resolved.yaml")) return;
+  throw ConfigError(folder.string() + ": holds a run, expected a folder for the sweep");
 }
 
 std::vector<sim::RunOrder> missing_runs(const sim::SweepPlan& plan,
@@ -180,9 +174,18 @@ std::vector<sim::RunOrder> missing_runs(const sim::SweepPlan& plan,
   return orders;
 }
 
-[[noreturn]] void fail_on_full_disk(const sim::SweepFolder& folder) {
-  throw std::runtime_error(folder.root().string() +
-                           ": the disk is full; make room and give the same command again");
+[[noreturn]] void fail_on_full_disk(const sim::SweepFolder& folder, const std::string& said) {
+  throw std::runtime_error(folder.root().string() + ": the disk is full (" + said +
+                           "); make room and give the same command again");
+}
+
+void prepare(const sim::SweepFolder& folder, const sim::SweepPlan& plan) {
+  try {
+    folder.prepare(plan);
+  } catch (const DiskError& error) {
+    if (error.disk_full()) fail_on_full_disk(folder, error.what());
+    throw;
+  }
 }
 
 int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
@@ -205,31 +208,33 @@ int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
          next_table_s = progress.elapsed_s + kTablePeriod_s;
          try {
            write_tables(plan, folder);
-         } catch (const sim::DiskError&) {
+         } catch (const DiskError&) {
            // The next run finds out what is wrong with the disk.
          }
        }});
   const sim::SweepEnd end = supervisor.fly(orders);
-  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder, supervisor.disk_full());
   write_tables(plan, folder);
   if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
   return supervisor.progress().broken == 0 ? 0 : 1;
 }
 
-int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int at_a_time,
-           const std::vector<std::string>& options) {
+int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder,
+           const sim::SlurmOptions& options) {
   {
     // What killed jobs have left can go when no task is at work.
     sim::FileLock workers(folder.root() / kWorkersLock, sim::FileLock::Mode::kExclusive);
     if (workers.take()) folder.remove_all_partials();
   }
   // The queue first: what leaves it after this look is finished at the next, or really missing.
-  const std::set<std::string> queued = sim::queued_runs(folder);
+  const sim::SlurmQueue queue = sim::queue_of(folder);
   std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
   const std::size_t missing = orders.size();
-  std::erase_if(orders, [&](const auto& order) { return queued.count(order.id) > 0; });
-  const auto batches = sim::submit(folder, plan, orders, kSelf, at_a_time, options);
-  for (const sim::SlurmBatch& batch : batches) {
+  std::erase_if(orders, [&](const auto& order) { return queue.runs.count(order.id) > 0; });
+  const sim::SlurmSubmission submission = sim::submit(folder, plan, orders, kSelf, queue, options);
+  std::size_t submitted = 0;
+  for (const sim::SlurmBatch& batch : submission.batches) {
+    submitted += batch.runs;
     std::printf("submitted %zu runs as job %s (%s)\n", batch.runs, batch.job_id.c_str(),
                 batch.name.c_str());
   }
@@ -237,7 +242,20 @@ int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int at_a_
     std::printf("%zu runs are in Slurm's queue already\n", missing - orders.size());
   }
   write_tables(plan, folder);
-  return 0;
+  if (submission.refusal.empty()) return 0;
+  std::fflush(stdout);
+  throw std::runtime_error(submission.refusal + " (" + std::to_string(submitted) + " of " +
+                           std::to_string(orders.size()) +
+                           " runs are submitted and stay so; mend the cause and give the same " +
+                           "command again for the others)");
+}
+
+std::size_t array_size_of_cluster() {
+  try {
+    return sim::max_array_size();
+  } catch (const sim::SlurmError& error) {
+    throw ConfigError(std::string("--slurm: ") + error.what());
+  }
 }
 
 }  // namespace
@@ -248,20 +266,33 @@ int sweep(const SweepArguments& arguments) {
   if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 
-  const sim::SweepFolder folder(made_folder(arguments.out));
+  sim::SlurmOptions slurm{1, arguments.jobs, arguments.sbatch_options};
+  if (arguments.slurm) slurm.longest = array_size_of_cluster();
+  const Interrupts interrupts;
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the progress may leave: the sweep goes on
+  const sim::OutputFolder made(arguments.out);
+  const sim::SweepFolder folder(std::filesystem::canonical(made.path()));
+  expect_no_run(folder.root());
   sim::FileLock lock(folder.root() / kDriverLock, sim::FileLock::Mode::kExclusive);
   if (!lock.take(kPatience_s)) {
     throw ConfigError(arguments.out + ": another sweep is at work here (" + lock.holder() +
                       "), expected a folder of its own");
   }
-  lock.sign("process " + std::to_string(getpid()) + " on " + sim::host_name());
+  lock.sign();
   warn_of_another_build(plan, folder);
-  folder.prepare(plan);
-  const int result = arguments.slurm
-                         ? submit(plan, folder, arguments.jobs, arguments.sbatch_options)
-                         : fly(plan, folder, arguments.jobs > 0 ? arguments.jobs : cores());
-  std::printf("%s\n", (folder.root() / "sweep.csv").c_str());
-  return result;
+  prepare(folder, plan);
+  if (Interrupts::signal() != 0) return 128 + SIGINT;
+  try {
+    const int result = arguments.slurm
+                           ? submit(plan, folder, slurm)
+                           : fly(plan, folder, arguments.jobs > 0 ? arguments.jobs : cores());
+    std::printf("%s\n", (folder.root() / "sweep.csv").c_str());
+    flush_standard_output();
+    return result;
+  } catch (const DiskError& error) {
+    if (error.disk_full()) fail_on_full_disk(folder, error.what());
+    throw std::runtime_error(error.what());  // no bad input: what was flown until then stays
+  }
 }
 
 int sweep_task(const SweepTaskArguments& arguments) {
@@ -285,7 +316,7 @@ int sweep_task(const SweepTaskArguments& arguments) {
                               },
                               {}});
   const sim::SweepEnd end = supervisor.fly({order});
-  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder);
+  if (end == sim::SweepEnd::kDiskFull) fail_on_full_disk(folder, supervisor.disk_full());
   if (end == sim::SweepEnd::kInterrupted) return 128 + SIGINT;
   return supervisor.progress().broken == 0 ? 0 : 1;
 }

@@ -21,16 +21,14 @@ namespace {
 
 constexpr off_t kKeptOutput = 16 << 20;
 
-// What is ignored on purpose, as under nohup, stays ignored.
+// A SIGHUP that is ignored on purpose, as under nohup, stays ignored.
 sigset_t gate_signals() {
   sigset_t set;
   sigemptyset(&set);
-  sigaddset(&set, SIGCHLD);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    struct sigaction action {};
-    sigaction(signal, nullptr, &action);
-    if (action.sa_handler != SIG_IGN) sigaddset(&set, signal);
-  }
+  for (const int signal : {SIGCHLD, SIGINT, SIGTERM}) sigaddset(&set, signal);
+  struct sigaction action {};
+  sigaction(SIGHUP, nullptr, &action);
+  if (action.sa_handler != SIG_IGN) sigaddset(&set, SIGHUP);
   return set;
 }
 
@@ -42,6 +40,7 @@ sigset_t gate_signals() {
   setpgid(0, 0);  // Ctrl-C in a terminal is for the parent, which ends its children itself
   const sigset_t ours = gate_signals();
   sigprocmask(SIG_UNBLOCK, &ours, nullptr);
+  ::signal(SIGPIPE, SIG_DFL);
   dup2(output, STDOUT_FILENO);
   dup2(output, STDERR_FILENO);
   const int null = open("/dev/null", O_RDONLY);

@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "config/text.h"
+#include "run/file_io.h"
 #include "run/foreign_json.h"
+#include "run/summary.h"
 #include "run/trajectory_hash.h"
 #include "sweep/child_process.h"
-#include "sweep/file_io.h"
 
 namespace arex::sim {
 namespace {
@@ -23,29 +26,34 @@ constexpr double kPatience_s = 120;                 // with a controller that do
 constexpr int kNotFound = 127;                      // as in a shell
 constexpr int kTimeMargin_min = 2;                  // to start, to write, to be scheduled out
 
-/// What a command of Slurm answers. @throws SlurmError if it fails.
-std::string ask(const std::string& program, const std::vector<std::string>& arguments,
-                const fs::path& folder) {
-  ChildProcess process(program, arguments, folder);
-  const auto exit = process.wait(kPatience_s);
-  if (!exit) throw SlurmError(program + " does not answer");
-  if (exit->exit_code == kNotFound) {
-    throw SlurmError(program + ": not found, expected Slurm's commands in PATH");
-  }
-  if (exit->exit_code != 0) {
-    std::string said = exit->output.empty() ? program + " failed" : exit->output;
-    while (!said.empty() && said.back() == '\n') said.pop_back();
-    std::replace(said.begin(), said.end(), '\n', ' ');
-    throw SlurmError(said);
-  }
-  return exit->output;
-}
-
 std::vector<std::string> lines_of(const std::string& text) {
   std::istringstream stream(text);
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
   return lines;
+}
+
+// What a command complains of, its lines joined.
+std::string on_one_line(const std::string& text) {
+  std::string words;
+  for (const std::string& line : lines_of(text)) {
+    if (!line.empty()) words += (words.empty() ? "" : "; ") + line;
+  }
+  return printable(words);
+}
+
+/// What a command of Slurm answers. @throws SlurmError if it fails.
+std::string ask(const std::string& program, const std::vector<std::string>& arguments,
+                const fs::path& folder) {
+  ChildProcess process(program, arguments, folder);
+  const auto exit = process.wait(kPatience_s);
+  if (!exit) throw SlurmError(program + ": does not answer, expected a cluster that does");
+  if (exit->exit_code == kNotFound) {
+    throw SlurmError(program + ": not found, expected Slurm's commands in PATH");
+  }
+  if (exit->exit_code == 0) return exit->output;
+  const std::string words = on_one_line(exit->output);
+  throw SlurmError(program + ": " + (words.empty() ? "failed without a word" : words), true);
 }
 
 bool is_number(const std::string& text) {
@@ -106,17 +114,40 @@ void write_batch(const SweepFolder& folder, const std::string& name, const Sweep
   write_atomically(folder.root() / "slurm" / (name + ".sh"),
                    "#!/bin/sh\nexec " + shell_quoted(program.string()) + " sweep-task " +
                        shell_quoted(file.string()) + " \"$SLURM_ARRAY_TASK_ID\"\n");
-  write_atomically(file, batch.dump(2) + "\n");
+  write_atomically(file, json_text(batch));
+}
+
+void remove_batch(const SweepFolder& folder, const std::string& name) {
+  std::error_code none;
+  for (const char* ending : {".json", ".sh"}) {
+    fs::remove(folder.root() / "slurm" / (name + ending), none);
+  }
+}
+
+// Beside what the user's own --dependency asks for; sbatch would heed the last one only.
+std::string dependency_on(const std::set<std::string>& job_ids,
+                          const std::vector<std::string>& sbatch) {
+  constexpr std::string_view kLong = "--dependency";
+  std::string text;
+  for (std::size_t i = 0; i < sbatch.size(); ++i) {
+    const std::string& word = sbatch[i];
+    if (word.starts_with(std::string(kLong) + "=")) text = word.substr(kLong.size() + 1) + ",";
+    if ((word == kLong || word == "-d") && i + 1 < sbatch.size()) text = sbatch[i + 1] + ",";
+  }
+  text += "afterany";
+  for (const std::string& id : job_ids) text += ":" + id;
+  return std::string(kLong) + "=" + text;
 }
 
 std::vector<std::string> sbatch_arguments(const SweepFolder& folder, const SweepPlan& plan,
-                                          const std::string& name, std::size_t runs, int at_a_time,
-                                          const std::vector<std::string>& options) {
+                                          const std::string& name, std::size_t runs,
+                                          const SlurmOptions& options,
+                                          const std::set<std::string>& before) {
   // A plan's timeout is at most 1e9 s, its retries are at most a hundred.
   const auto minutes = kTimeMargin_min + static_cast<std::int64_t>(
                                              std::ceil(plan.timeout_s * (plan.retries + 1) / 60));
   std::string array = "--array=0-" + std::to_string(runs - 1);
-  if (at_a_time > 0) array += "%" + std::to_string(at_a_time);
+  if (options.at_a_time > 0) array += "%" + std::to_string(options.at_a_time);
   std::vector<std::string> arguments{"--parsable",
                                      "--ntasks=1",
                                      "--cpus-per-task=1",
@@ -125,7 +156,10 @@ std::vector<std::string> sbatch_arguments(const SweepFolder& folder, const Sweep
                                      "--open-mode=append",
                                      "--chdir=" + folder.root().string(),
                                      "--output=slurm/" + name + "-%a.log"};
-  arguments.insert(arguments.end(), options.begin(), options.end());
+  arguments.insert(arguments.end(), options.sbatch.begin(), options.sbatch.end());
+  if (options.at_a_time > 0 && !before.empty()) {
+    arguments.push_back(dependency_on(before, options.sbatch));
+  }
   arguments.insert(arguments.end(), {array, "--job-name=" + name, "slurm/" + name + ".sh"});
   return arguments;
 }
@@ -164,7 +198,7 @@ BatchFile load_batch(const fs::path& file) {
   return batch;
 }
 
-std::set<std::string> queued_runs(const SweepFolder& folder) {
+SlurmQueue queue_of(const SweepFolder& folder) {
   const std::vector<fs::path> files = batch_files(folder);
   if (files.empty()) return {};
   std::map<std::string, BatchFile> batches;
@@ -173,42 +207,46 @@ std::set<std::string> queued_runs(const SweepFolder& folder) {
     batches.emplace(file.stem().string(), load_batch(file));
     names += (names.empty() ? "" : ",") + file.stem().string();
   }
-  // Waiting and running tasks, a line each: name and index.
-  const std::string answer =
-      ask("squeue", {"--noheader", "--array", "--name=" + names, "--format=%j %K"}, folder.root());
-  std::set<std::string> ids;
+  // Waiting and running tasks, a line each: name, index and array.
+  const std::string answer = ask(
+      "squeue", {"--noheader", "--array", "--name=" + names, "--format=%j %K %F"}, folder.root());
+  SlurmQueue queue;
   for (const std::string& line : lines_of(answer)) {
-    const auto space = line.rfind(' ');
-    if (space == std::string::npos || !is_number(line.substr(space + 1))) continue;
-    const auto batch = batches.find(line.substr(0, space));
-    const std::size_t index = std::stoul(line.substr(space + 1));
-    if (batch == batches.end() || index >= batch->second.runs.size()) continue;
-    ids.insert(batch->second.runs[index].id);
+    std::istringstream cells(line);
+    std::string name, index, job;
+    if (!(cells >> name >> index >> job) || !is_number(index) || index.size() > 9) continue;
+    const auto batch = batches.find(name);
+    const std::size_t task = std::stoul(index);
+    if (batch == batches.end() || task >= batch->second.runs.size()) continue;
+    queue.runs.insert(batch->second.runs[task].id);
+    queue.job_ids.insert(job);
   }
-  return ids;
+  return queue;
 }
 
-std::size_t max_array_size(const SweepFolder& folder) {
-  for (const std::string& line : lines_of(ask("scontrol", {"show", "config"}, folder.root()))) {
+std::size_t max_array_size() {
+  ask("sbatch", {"--version"}, "/");
+  for (const std::string& line : lines_of(ask("scontrol", {"show", "config"}, "/"))) {
     if (!line.starts_with("MaxArraySize")) continue;
     const auto digits = line.find_first_of("0123456789");
-    if (digits != std::string::npos)
-      return std::max<std::size_t>(1, std::stoul(line.substr(digits)));
+    if (digits == std::string::npos) continue;
+    const unsigned long size = std::strtoul(line.c_str() + digits, nullptr, 10);
+    return std::max<std::size_t>(1, size);
   }
   return kDefaultMaxArraySize;
 }
 
-std::vector<SlurmBatch> submit(const SweepFolder& folder, const SweepPlan& plan,
-                               const std::vector<RunOrder>& orders, const fs::path& program,
-                               int at_a_time, const std::vector<std::string>& options) {
-  std::vector<SlurmBatch> batches;
-  if (orders.empty()) return batches;
-  const std::size_t longest = max_array_size(folder);
+SlurmSubmission submit(const SweepFolder& folder, const SweepPlan& plan,
+                       const std::vector<RunOrder>& orders, const fs::path& program,
+                       const SlurmQueue& queue, const SlurmOptions& options) {
+  SlurmSubmission submission;
+  if (orders.empty()) return submission;
   fs::create_directories(folder.root() / "slurm");
   const fs::path kept = keep_program(folder, plan, program);
+  std::set<std::string> before = queue.job_ids;
   std::size_t number = batch_files(folder).size();
-  for (std::size_t begin = 0; begin < orders.size(); begin += longest) {
-    const std::size_t end = std::min(orders.size(), begin + longest);
+  for (std::size_t begin = 0; begin < orders.size(); begin += options.longest) {
+    const std::size_t end = std::min(orders.size(), begin + options.longest);
     const std::vector<RunOrder> runs(orders.begin() + static_cast<std::ptrdiff_t>(begin),
                                      orders.begin() + static_cast<std::ptrdiff_t>(end));
     std::string name;
@@ -216,10 +254,19 @@ std::vector<SlurmBatch> submit(const SweepFolder& folder, const SweepPlan& plan,
       name = batch_name(folder, plan.name, ++number);
     } while (fs::exists(folder.root() / "slurm" / (name + ".json")));
     write_batch(folder, name, plan, runs, kept);
-    const auto arguments = sbatch_arguments(folder, plan, name, runs.size(), at_a_time, options);
-    batches.push_back({name, job_id_of(ask("sbatch", arguments, folder.root())), runs.size()});
+    try {
+      const auto arguments = sbatch_arguments(folder, plan, name, runs.size(), options, before);
+      const std::string job_id = job_id_of(ask("sbatch", arguments, folder.root()));
+      submission.batches.push_back({name, job_id, runs.size()});
+      before = {job_id};
+    } catch (const SlurmError& error) {
+      // Without an answer it may be in the queue: then its name must stay known.
+      if (error.refused()) remove_batch(folder, name);
+      submission.refusal = error.what();
+      return submission;
+    }
   }
-  return batches;
+  return submission;
 }
 
 }  // namespace arex::sim

@@ -19,10 +19,16 @@
 /// is killed between Slurm's yes and our note of it.
 namespace arex::sim {
 
-/// Slurm said no; what() has its words.
+/// Slurm cannot be asked, or said no; what() has its words on one line.
 class SlurmError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit SlurmError(const std::string& message, bool refused = false)
+      : std::runtime_error(message), refused_(refused) {}
+  /// It did answer, with a no: nothing has been submitted.
+  [[nodiscard]] bool refused() const { return refused_; }
+
+ private:
+  bool refused_;
 };
 
 /// An array of jobs that Slurm took.
@@ -40,20 +46,36 @@ struct BatchFile {
 };
 BatchFile load_batch(const std::filesystem::path& file);
 
-/// Ids of the runs that wait in Slurm's queue or fly. @throws SlurmError if there are batches and
-/// Slurm does not answer: their runs must not be submitted again.
-std::set<std::string> queued_runs(const SweepFolder& folder);
+/// What of a sweep's folder waits in Slurm's queue or flies.
+struct SlurmQueue {
+  std::set<std::string> runs;     ///< ids
+  std::set<std::string> job_ids;  ///< of the arrays that they belong to
+};
+/// @throws SlurmError if there are batches and Slurm does not answer: their runs must not be
+/// submitted again.
+SlurmQueue queue_of(const SweepFolder& folder);
 
-/// Tasks that one array may have on this cluster.
-std::size_t max_array_size(const SweepFolder& folder);
+/// Asks a cluster, before anything is made ready for it. @throws SlurmError if there is none.
+/// @return the tasks that one array may have
+std::size_t max_array_size();
 
-/// Submits runs, in as many arrays as MaxArraySize asks for.
-/// @param at_a_time tasks of an array that may run at once; 0: as many as Slurm gives
-/// @param options of sbatch; they come after ours and win, but for the array and its name
-/// @throws SlurmError; the batches before it are submitted.
-std::vector<SlurmBatch> submit(const SweepFolder& folder, const SweepPlan& plan,
-                               const std::vector<RunOrder>& orders,
-                               const std::filesystem::path& program, int at_a_time,
-                               const std::vector<std::string>& options);
+/// How to submit.
+struct SlurmOptions {
+  std::size_t longest = 1;  ///< tasks of an array
+  int at_a_time = 0;        ///< tasks of all arrays together that may run at once; 0: any number
+  std::vector<std::string> sbatch;  ///< of sbatch; they win over ours, but for array and name
+};
+
+/// What came of a submission: the batches that Slurm took, and why it took no more.
+struct SlurmSubmission {
+  std::vector<SlurmBatch> batches;
+  std::string refusal;  ///< empty: all are submitted
+};
+
+/// Submits runs, in as many arrays as `longest` asks for. Where at_a_time bounds them, each array
+/// waits for the end of the one before and of what is in the queue already.
+SlurmSubmission submit(const SweepFolder& folder, const SweepPlan& plan,
+                       const std::vector<RunOrder>& orders, const std::filesystem::path& program,
+                       const SlurmQueue& queue, const SlurmOptions& options);
 
 }  // namespace arex::sim

@@ -8,7 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "sweep/file_io.h"
+#include "run/file_io.h"
+#include "run/summary.h"
 
 namespace arex::sim {
 namespace {
@@ -46,11 +47,6 @@ std::string end_of(const std::string& text) {
   return text.size() <= kKeptOutput ? text : text.substr(text.size() - kKeptOutput);
 }
 
-bool speaks_of_a_full_disk(const std::string& text) {
-  return text.find(std::strerror(ENOSPC)) != std::string::npos ||
-         text.find(std::strerror(EDQUOT)) != std::string::npos;
-}
-
 }  // namespace
 
 Supervisor::Supervisor(const SweepFolder& folder, std::filesystem::path program,
@@ -69,7 +65,7 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
     waiting_.emplace_back(&*order, 1);
   }
   double told_s = -1;
-  while (!flights_.empty() || (!waiting_.empty() && !disk_full_)) {
+  while (!flights_.empty() || (!waiting_.empty() && disk_full_.empty())) {
     refill();
     if (SignalGate::wait(kLongestWait_s) != 0) {
       stop_all();
@@ -86,7 +82,7 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
       tell();
     }
   }
-  return disk_full_ ? SweepEnd::kDiskFull : SweepEnd::kDone;
+  return disk_full_.empty() ? SweepEnd::kDone : SweepEnd::kDiskFull;
 }
 
 void Supervisor::start(const RunOrder& order, int attempt) {
@@ -109,7 +105,7 @@ void Supervisor::kill_overdue() {
 }
 
 void Supervisor::refill() {
-  while (!disk_full_ && !waiting_.empty() &&
+  while (disk_full_.empty() && !waiting_.empty() &&
          flights_.size() < static_cast<std::size_t>(options_.jobs)) {
     const auto [order, attempt] = waiting_.back();
     waiting_.pop_back();
@@ -141,17 +137,18 @@ bool Supervisor::settle(const Flight& flight, const ChildExit& exit) {
     if (!flight.overran && keep(flight, exit)) return true;
     folder_.log("broken", order.id, flight.attempt, state.detail);
     if (speaks_of_a_full_disk(exit.output) || !accepts_writes(folder_.root())) {
-      disk_full_ = true;
+      disk_full_ = last_line(exit.output);
+      if (disk_full_.empty()) disk_full_ = folder_.root().string() + ": takes no more";
     } else if (state.failure == Failure::kRefused || flight.attempt > options_.retries) {
       give_up(order, state, flight.attempt, exit.output);
       return true;
     }
   } catch (const DiskError& error) {
     if (!error.disk_full() && accepts_writes(folder_.root())) throw;
-    disk_full_ = true;
+    disk_full_ = error.what();
   }
   folder_.remove_partial(order.id);
-  return disk_full_;
+  return !disk_full_.empty();
 }
 
 // Exit code 1 with a summary is a mission that failed: a result like any other.
@@ -165,7 +162,7 @@ bool Supervisor::keep(const Flight& flight, const ChildExit& exit) {
                                     {"wall_s", exit.wall_s},
                                     {"cpu_s", exit.cpu_s},
                                     {"max_rss_mb", exit.max_rss_mb}};
-  write_atomically(partial / "host.json", host.dump(2) + "\n");
+  write_atomically(partial / "host.json", json_text(host));
   if (!exit.output.empty()) write_atomically(partial / "output.txt", end_of(exit.output));
   if (!folder_.publish(order.id)) return false;
   folder_.log("finish", order.id, flight.attempt, "");

@@ -52,6 +52,8 @@ class Supervisor {
              Listener listener);
 
   SweepEnd fly(const std::vector<RunOrder>& orders);
+  /// What the disk said when it took no more.
+  [[nodiscard]] const std::string& disk_full() const { return disk_full_; }
   [[nodiscard]] const SweepProgress& progress() const { return progress_; }
 
  private:
@@ -81,8 +83,8 @@ class Supervisor {
   std::list<Flight> flights_;
   std::vector<std::pair<const RunOrder*, int>> waiting_;  ///< with the attempt, last one first
   SweepProgress progress_;
-  bool disk_full_ = false;
-  double work_s_ = 0;  ///< wall time of what has finished
+  std::string disk_full_;  ///< what the disk said; empty: it takes more
+  double work_s_ = 0;      ///< wall time of what has finished
   std::chrono::steady_clock::time_point begin_;
 };
 

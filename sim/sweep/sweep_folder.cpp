@@ -8,8 +8,9 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "run/file_io.h"
 #include "run/foreign_json.h"
-#include "sweep/file_io.h"
+#include "run/summary.h"
 
 namespace arex::sim {
 namespace {
@@ -25,6 +26,7 @@ bool valid(const ordered_json& summary) {
   if (!summary.is_object() || !summary.contains("outcome") || !summary.contains("build")) {
     return false;
   }
+  if (summary.contains("unwritten")) return false;  // the disk refused a part of the run
   const ordered_json& outcome = summary["outcome"];
   return outcome.is_string() && outcome != "interrupted" && outcome != "flying";
 }
@@ -54,7 +56,7 @@ void SweepFolder::prepare(const SweepPlan& plan) const {
   std::error_code error;
   for (const char* name : {"plan", "runs"}) {
     fs::create_directories(root_ / name, error);
-    if (error) throw DiskError("cannot be created", root_ / name, error);
+    if (error) throw DiskError(root_ / name, "cannot be created", error);
   }
   for (const PlannedRun& run : plan.runs) {
     const fs::path file = root_ / configuration(run.id);
@@ -65,7 +67,7 @@ void SweepFolder::prepare(const SweepPlan& plan) const {
                            {"keys", plan.keys},       {"variants", plan.has_variants},
                            {"repeats", plan.repeats}, {"timeout_s", plan.timeout_s},
                            {"retries", plan.retries}, {"runs", plan.runs.size()}};
-  write_atomically(root_ / "sweep.json", sweep.dump(2) + "\n");
+  write_atomically(root_ / "sweep.json", json_text(sweep));
 }
 
 std::optional<ordered_json> SweepFolder::summary(const std::string& id) const {
@@ -102,7 +104,7 @@ bool SweepFolder::publish(const std::string& id) const {
   remove_folder(to);
   std::error_code error;
   fs::rename(from, to, error);
-  if (error) throw DiskError("cannot be renamed", from, to, error);
+  if (error) throw DiskError(from, "cannot be renamed", error);
   sync_names(root_ / "runs");
   remove_folder(root_ / failed(id));
   return true;
@@ -117,10 +119,10 @@ void SweepFolder::record_failure(const std::string& id, const RunState& state, i
                             {"detail", state.detail},
                             {"attempts", attempts},
                             {"host", host_name()}};
-  write_atomically(from / "failure.json", record.dump(2) + "\n");
+  write_atomically(from / "failure.json", json_text(record));
   remove_folder(to);
   fs::rename(from, to, error);
-  if (error) throw DiskError("cannot be renamed", from, to, error);
+  if (error) throw DiskError(from, "cannot be renamed", error);
 }
 
 void SweepFolder::remove_partial(const std::string& id) const {
@@ -156,12 +158,6 @@ void SweepFolder::log(const std::string& event, const std::string& id, int attem
   if (!fs::exists(file, none)) append_line(file, "time,host,pid,event,run,attempt,detail");
   append_line(file, utc_now() + "," + host_name() + "," + std::to_string(getpid()) + "," + event +
                         "," + id + "," + std::to_string(attempt) + "," + csv_cell(detail));
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return name.data();
 }
 
 std::string csv_cell(const std::string& text) {

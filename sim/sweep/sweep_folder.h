@@ -68,8 +68,6 @@ class SweepFolder {
   std::filesystem::path root_;
 };
 
-std::string host_name();
-
 /// A cell of a CSV file, quoted where it must be.
 std::string csv_cell(const std::string& text);
 

@@ -3,10 +3,10 @@
 #include <nlohmann/json.hpp>
 
 #include "report/table.h"
+#include "run/file_io.h"
 #include "run/summary.h"
 #include "scoring/figures.h"
 #include "support/temporary_folder.h"
-#include "sweep/file_io.h"
 #include "sweep/sweep_table.h"
 
 namespace arex::sim {

@@ -173,6 +173,7 @@ TEST_F(SweepRecovery, SurvivesAFullDisk) {
   const ProcessResult full = arex(sweep_arguments(file(), out));
   EXPECT_EQ(full.exit_code, 1);
   EXPECT_NE(full.err.find("the disk is full"), std::string::npos) << full.err;
+  EXPECT_NE(full.err.find("No space left on device"), std::string::npos) << full.err;
   const std::size_t fitted = finished_runs(out).size();
   EXPECT_GT(fitted, 5u);
   EXPECT_LT(fitted, std::size_t{kShortRuns});
@@ -187,6 +188,23 @@ TEST_F(SweepRecovery, SurvivesAFullDisk) {
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
   expect_untouched(before, out);
   expect_complete(out, undisturbed());
+}
+
+TEST_F(SweepRecovery, AFileThatMayNotGrowIsNoCrashToBeTriedAgain) {
+  const TemporaryFolder folder;
+  const fs::path out = folder / "out";
+  std::vector<std::string> words{"-c", "ulimit -f 60; exec \"$@\"", "sh", AREX_BINARY};
+  for (const std::string& word : sweep_arguments(file(), out)) words.push_back(word);
+  // 30 kB a file: a plan's configuration fits, a flight of some seconds does not.
+  write_text(folder / "sweep.yaml", "base: " AREX_SOURCE_DIR
+                                    "/scenarios/inflation.yaml\nset: {mission.max_time_s: 5, "
+                                    "devices.lidar: false, odometry.source: mocap, "
+                                    "mapping.use_depth: false}\nretries: 3\n");
+  words[5] = (folder / "sweep.yaml").string();
+  const ProcessResult result = test::run_process("/bin/sh", words);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+  EXPECT_EQ(count_lines_with(out / "log.csv", ",start,"), 1u);
 }
 
 TEST_F(SweepRecovery, AnInterruptStopsItAndTheSameCommandGoesOn) {

@@ -114,5 +114,88 @@ TEST(SlurmSweep, SaysWhatSlurmSays) {
   EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
 }
 
+TEST(SlurmSweep, JobsBoundAllArraysTogether) {
+  const TemporaryFolder folder;
+  write_text(folder / "sweep.yaml", test::short_sweep());
+  const SlurmCluster cluster(kMaxArraySize);  // of two cores
+  const ProcessResult submitted =
+      arex({"sweep", (folder / "sweep.yaml").string(), "--out", (folder / "out").string(), "--jobs",
+            "1", "--slurm", "--partition=test"});
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.err << cluster.logs();
+  ASSERT_EQ(count_of(submitted.out, "submitted "), 3u) << submitted.out;
+  std::size_t most = 0;
+  ASSERT_TRUE(wait_until([&] {
+    const ProcessResult running =
+        run_process("squeue", {"--noheader", "--array", "--states=R", "--format=%K"});
+    most = std::max(most, count_of(running.out, "\n"));
+    return queue_is_empty();
+  })) << cluster.logs();
+  EXPECT_EQ(most, 1u);
+  EXPECT_EQ(finished_runs(folder / "out").size(), std::size_t{kShortRuns});
+}
+
+/// Commands of a cluster that are scripts of the test's own, first in PATH.
+class FakeCluster {
+ public:
+  explicit FakeCluster(const std::map<std::string, std::string>& scripts) {
+    for (const auto& [name, text] : scripts) {
+      write_text(folder_ / name, "#!/bin/sh\n" + text);
+      fs::permissions(folder_ / name, fs::perms(0755));
+    }
+    setenv("PATH", (folder_.path().string() + ":/bin").c_str(), 1);
+  }
+  ~FakeCluster() { setenv("PATH", path_.c_str(), 1); }
+  FakeCluster(const FakeCluster&) = delete;
+  FakeCluster& operator=(const FakeCluster&) = delete;
+
+ private:
+  TemporaryFolder folder_;
+  std::string path_ = getenv("PATH");
+};
+
+TEST(SlurmSweep, WithoutAClusterIsOneLineAndLeavesNothing) {
+  const TemporaryFolder folder;
+  write_text(folder / "sweep.yaml", test::short_sweep());
+  const auto expect = [&](const std::map<std::string, std::string>& scripts,
+                          const std::string& said) {
+    const FakeCluster cluster(scripts);
+    const ProcessResult result = submit(folder / "sweep.yaml", folder / "out");
+    EXPECT_EQ(result.exit_code, 2) << said;
+    EXPECT_EQ(result.err.find("--slurm: " + said), 0u) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(fs::exists(folder / "out"));
+  };
+  const std::string fails = "echo 'first line' >&2; printf 'second\\033[31m' >&2; exit 1\n";
+  expect({{"sbatch", fails}, {"scontrol", fails}}, "sbatch: first line; second\\x1b");
+  expect({{"sbatch", "exit 0\n"}, {"scontrol", fails}}, "scontrol: first line; second");
+  expect({{"sbatch", "exit 0\n"}, {"scontrol", "exit 3\n"}}, "scontrol: failed without a word");
+}
+
+TEST(SlurmSweep, ARefusedArrayKeepsTheAcceptedOnesAndSaysHowToGoOn) {
+  const TemporaryFolder folder;
+  write_text(folder / "sweep.yaml", test::short_sweep());
+  const std::string count = (folder / "count").string();
+  const FakeCluster cluster(
+      {{"scontrol", "echo 'MaxArraySize = 21'\n"},
+       {"squeue", "exit 0\n"},
+       {"sbatch", "[ \"$1\" = --version ] && exit 0\necho x >> " + count + "\nif [ $(wc -l < " +
+                      count +
+                      ") -gt 2 ]; then echo 'sbatch: error: QOSMaxSubmitJobPerUserLimit' >&2; "
+                      "exit 1; fi\nwc -l < " +
+                      count + "\n"}});
+  const ProcessResult result = submit(folder / "sweep.yaml", folder / "out");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(count_of(result.out, "submitted 21 runs as job "), 2u) << result.out;
+  EXPECT_NE(result.err.find("QOSMaxSubmitJobPerUserLimit (42 of 48 runs are submitted"),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  std::size_t batches = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "out/slurm")) {
+    batches += entry.path().extension() == ".json";
+  }
+  EXPECT_EQ(batches, 2u);
+}
+
 }  // namespace
 }  // namespace arex

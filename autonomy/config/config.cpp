@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
-#include <numeric>
 #include <sstream>
 #include <utility>
 
+#include "config/nearest.h"
 #include "config/text.h"
 #include "config/yaml_reader.h"
 
@@ -18,28 +18,6 @@ namespace arex {
 namespace {
 
 constexpr std::string_view kOverride = "--set";
-constexpr std::size_t kLongestKey = 64;  // that is worth a guess
-
-// Levenshtein distance, for 'did you mean'.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, substituted}));
-    }
-  }
-  return row.back();
-}
-
-// A key that continues or shortens another is what people mean even when the distance is large:
-// 'inflation' for 'inflation_m'.
-std::size_t unlikeness(std::string_view given, std::string_view known) {
-  const bool prefix = known.starts_with(given) || given.starts_with(known);
-  return edit_distance(given, known) / (prefix ? 4 : 1);
-}
 
 std::string shown(const ConfigNode& node) {
   switch (node.kind) {
@@ -394,12 +372,8 @@ void reject_unknown(const ConfigNode& node, const std::vector<std::string>& know
   for (const ConfigNode::Entry& entry : node.entries) {
     if (std::find(known.begin(), known.end(), entry.key) != known.end()) continue;
     std::string message = "unknown key '" + shortened(entry.key) + "'";
-    if (!known.empty() && entry.key.size() <= kLongestKey) {
-      const auto nearest =
-          std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-            return unlikeness(entry.key, a) < unlikeness(entry.key, b);
-          });
-      message += "; did you mean '" + *nearest + "'?";
+    if (!known.empty()) {
+      message += "; did you mean '" + nearest(entry.key, known) + "'?";
     }
     fail(entry.where, message);
   }

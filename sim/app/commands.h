@@ -18,13 +18,13 @@ struct ScenarioArguments {
 
 struct RunArguments {
   ScenarioArguments scenario;
-  std::string out;                        ///< empty: runs/<scenario>-seed<seed>
+  std::string out;                        ///< empty: see RunFolder::first_free
   std::string name;                       ///< of the scenario, in the summary; empty: the file's
   std::string bag;                        ///< ROS 1 bag to write; empty: none
   std::vector<std::string> requirements;  ///< of the summary: field>=value
   std::string junit;                      ///< JUnit file to write; empty: none
-  int threads = 1;
-  bool report = true;  ///< also write report.html
+  int threads = 0;                        ///< 0: one a core, four at most
+  bool report = true;                     ///< also write report.html
   bool quiet = false;
 };
 int run(const RunArguments& arguments);

@@ -1,17 +1,25 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
 
 #include "app/commands.h"
+#include "app/host.h"
 #include "app/number_option.h"
 #include "config/config.h"
+#include "config/nearest.h"
+#include "config/text.h"
+#include "files/files.h"
+#include "run/summary.h"
 
 namespace {
 
 using namespace arex::app;
+using arex::ConfigError;
+using arex::nearest;
 
 constexpr Range<std::uint64_t> kSeeds{};
 constexpr Range<double> kMoments{-1e9, 1e9};  // s, as in a scenario
@@ -28,7 +36,7 @@ void add_scenario_options(CLI::App& command, ScenarioArguments& arguments, bool 
 void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("run", "fly a scenario, write a scored run folder");
   add_scenario_options(*command, arguments.scenario, true);
-  command->add_option("--out", arguments.out, "run folder; default runs/<scenario>-seed<seed>");
+  command->add_option("--out", arguments.out, "run folder; default runs/SCENARIO-seedN");
   command->add_option("--name", arguments.name, "the scenario's name; default the file's");
   command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
   command
@@ -37,9 +45,9 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
   add_number(*command, "--threads", arguments.threads, Range<int>{1, 64},
-             "host threads; the result does not change");
+             "host threads; the result does not change; default one a core, at most 4");
   command->add_flag("!--no-report", arguments.report, "no report.html");
-  command->add_flag("--quiet", arguments.quiet, "no progress line");
+  command->add_flag("--quiet", arguments.quiet, "no progress line; a failed mission is one line");
   command->callback([&] { exit_code = run(arguments); });
 }
 
@@ -130,6 +138,42 @@ void add_help(CLI::App& app, std::string& topic, int& exit_code) {
   command->callback([&] { exit_code = help_figures(); });
 }
 
+// The names that a command line may use where `word` stands, or nothing if it is one of them.
+std::vector<std::string> alternatives(const CLI::App& command, const std::string& word) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      if ("--" + name == word) return {};
+      names.push_back("--" + name);
+    }
+  }
+  return names;
+}
+
+// CLI11 only says that a word was not expected; the nearest one is what the user looks for.
+void expect_known_words(const CLI::App& app, const std::vector<std::string>& words) {
+  if (words.empty() || words[0].starts_with("-")) return;
+  std::vector<std::string> names;
+  const CLI::App* command = nullptr;
+  for (const CLI::App* each : app.get_subcommands({})) {
+    if (each->get_name() == words[0]) command = each;
+    if (!each->get_group().empty()) names.push_back(each->get_name());
+  }
+  if (command == nullptr) {
+    throw ConfigError("arex: unknown command '" + words[0] + "'; did you mean '" +
+                      nearest(words[0], names) + "'? See arex --help");
+  }
+  for (const std::string& word : words) {
+    if (word == "--") return;
+    if (!word.starts_with("--")) continue;
+    const std::string option = word.substr(0, word.find('='));
+    const std::vector<std::string> known = alternatives(*command, option);
+    if (known.empty()) continue;
+    throw ConfigError("arex " + words[0] + ": unknown option '" + option + "'; did you mean '" +
+                      nearest(option, known) + "'? See arex " + words[0] + " --help");
+  }
+}
+
 int execute(int argc, char** argv) {
   CLI::App app{"AREX: a software-in-the-loop testbed for autonomous exploring drones", "arex"};
   app.require_subcommand(1);
@@ -159,30 +203,42 @@ int execute(int argc, char** argv) {
   add_scenario_options(*validate_command, validate_arguments, true);
   validate_command->callback([&] { exit_code = validate(validate_arguments); });
 
+  app.set_version_flag("--version", [] {
+    return "arex " + arex::sim::build_version() + ", compiled by " + arex::sim::build_compiler();
+  });
   std::vector<std::string> words(argv + 1, argv + argc);
   sweep_arguments.sbatch_options = take_sbatch_options(words);
+  expect_known_words(app, words);
   std::reverse(words.begin(), words.end());  // as CLI11 wants them
   try {
     app.parse(words);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
+  } catch (const CLI::Success& answered) {  // --help, --version
+    return app.exit(answered);
   }
+  return exit_code;
+}
+
+int complain(const std::string& message, int exit_code) {
+  std::fprintf(stderr, "%s\n", arex::printable(message).c_str());
   return exit_code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write()
   try {
-    return execute(argc, argv);
+    const int exit_code = execute(argc, argv);
+    flush_standard_output();
+    return exit_code;
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "arex: %s; see arex --help\n", error.what());
-    return 2;
+    return complain("arex: " + std::string(error.what()) + "; see arex --help", 2);
   } catch (const arex::ConfigError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
+    return complain(error.what(), 2);
+  } catch (const arex::DiskError& error) {
+    return complain(error.what(), 2);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "arex: %s\n", error.what());
-    return 1;
+    return complain("arex: " + std::string(error.what()), 1);
   }
 }

@@ -1,13 +1,19 @@
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <utility>
 
 #include "app/commands.h"
 #include "app/film_writer.h"
 #include "app/flight_pictures.h"
 #include "config/config.h"
+#include "files/files.h"
 #include "report/run_record.h"
+#include "run/file_io.h"
 #include "run/scenario.h"
 
 namespace arex::app {
@@ -24,10 +30,44 @@ View view_named(const std::string& name) {
   return name == "both" ? View::kBoth : name == "top" ? View::kTop : View::kChase;
 }
 
+std::string format(const char* text, double a, double b, double c) {
+  std::array<char, 128> out{};
+  std::snprintf(out.data(), out.size(), text, a, b, c);
+  return out.data();
+}
+
+// Beginning and end, s; what reaches beyond the flight is cut.
+std::pair<double, double> span_of_film(const RenderArguments& arguments,
+                                       const std::vector<sim::StampedPose>& truth) {
+  const double first = truth.front().time_s;
+  const double last = truth.back().time_s;
+  const double begin = arguments.from_s.value_or(first);
+  const double end = arguments.to_s.value_or(last);
+  if (!(begin < last)) {
+    throw ConfigError(
+        format("--from %g: lies behind the end of the flight, expected %.2f to less than %.2f s",
+               begin, first, last));
+  }
+  if (!(end > first)) {
+    throw ConfigError(
+        format("--to %g: lies before the start of the flight, expected more than %.2f to %.2f s",
+               end, first, last));
+  }
+  if (!(begin < end)) {
+    throw ConfigError(format("--from %g: lies behind --to %g, expected it before", begin, end, 0));
+  }
+  return {std::max(begin, first), std::min(end, last)};
+}
+
 void draw_still(const RenderArguments& arguments, const worlds::World& world, const Pose& X_WO,
                 const std::vector<sim::StampedPose>& truth) {
+  const double begin = truth.front().time_s;
   const double end = truth.back().time_s;
   const double time = arguments.time_s.value_or(end / 2);
+  if (!(time >= begin && time <= end)) {
+    throw ConfigError(
+        format("--time %g: lies outside of the flight, expected %.2f to %.2f s", time, begin, end));
+  }
   const View view = view_named(arguments.view.empty() ? "chase" : arguments.view);
   FlightPictures pictures(world, X_WO, truth, view, {});
   sim::save_png(pictures.at(time, end), arguments.out);
@@ -36,22 +76,17 @@ void draw_still(const RenderArguments& arguments, const worlds::World& world, co
 
 void draw_film(const RenderArguments& arguments, const worlds::World& world, const Pose& X_WO,
                const std::vector<sim::StampedPose>& truth) {
-  const double begin = arguments.from_s.value_or(truth.front().time_s);
-  const double end = std::min(arguments.to_s.value_or(INFINITY), truth.back().time_s);
-  if (begin >= end) {
-    throw ConfigError(
-        "--from: lies behind the end of the flight or of the film, expected less than " +
-        std::to_string(end));
-  }
+  const auto [begin, end] = span_of_film(arguments, truth);
   sim::PictureOptions options;
   options.width = kFilmWidth;
   options.height = kFilmHeight;
-  const View view = view_named(arguments.view.empty() ? "both" : arguments.view);
-  FlightPictures pictures(world, X_WO, truth, view, options);
-
-  const std::filesystem::path file = arguments.out;
+  const std::filesystem::path file = check_writable(arguments.out);
   const std::filesystem::path ffmpeg = find_program("ffmpeg");
   const std::filesystem::path frames = file.parent_path() / (file.stem().string() + "_frames");
+  std::optional<sim::OutputFolder> folder;
+  if (ffmpeg.empty()) folder.emplace(frames);
+  const View view = view_named(arguments.view.empty() ? "both" : arguments.view);
+  FlightPictures pictures(world, X_WO, truth, view, options);
   const auto film =
       ffmpeg.empty() ? film_as_frames(frames)
                      : film_by_ffmpeg(ffmpeg, file, options.width, options.height, arguments.fps);
@@ -87,10 +122,17 @@ int render(const RenderArguments& arguments) {
   if (ending != ".png" && ending != ".mp4") {
     throw ConfigError("--out " + arguments.out + ": expected FILE.png or FILE.mp4");
   }
-  const std::vector<sim::StampedPose> truth = sim::read_tum(folder / "truth.tum");
-  if (truth.empty()) {
-    throw ConfigError((folder / "truth.tum").string() + ":1: holds no pose, expected a flown run");
+  if (!sim::is_run_folder(folder)) {
+    throw ConfigError(folder.string() +
+                      (std::filesystem::exists(folder) ? ": holds no run" : ": does not exist") +
+                      ", expected a run folder");
   }
+  const std::vector<sim::StampedPose> truth = sim::read_tum(folder / "truth.tum");
+  if (truth.size() < 2) {
+    throw ConfigError((folder / "truth.tum").string() +
+                      ": holds no flight, expected two poses and more");
+  }
+  check_writable(arguments.out);
   const sim::Scenario scenario = sim::load_scenario(folder / "resolved.yaml", {}, {});
   const worlds::World world = scenario.build_world();
   const Pose X_WO = sim::start_pose(world);

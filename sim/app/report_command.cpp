@@ -5,6 +5,7 @@
 
 #include "app/commands.h"
 #include "config/config.h"
+#include "files/files.h"
 #include "report/comparison_report.h"
 #include "report/page.h"
 #include "report/run_report.h"
@@ -15,9 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kReport = "report.html";
+constexpr const char* kExpected = ", expected a run folder or the folder of a sweep";
+
 void report_run(const fs::path& folder, const std::string& title) {
   const bool finished = sim::write_run_report(folder, title);
-  std::printf("%s/report.html%s\n", folder.c_str(), finished ? "" : " (unfinished run)");
+  std::printf("%s%s\n", (folder / kReport).c_str(), finished ? "" : " (unfinished run)");
 }
 
 void report_comparison(const std::vector<fs::path>& folders, const fs::path& directory,
@@ -29,8 +33,8 @@ void report_comparison(const std::vector<fs::path>& folders, const fs::path& dir
       if (sim::is_run_folder(run)) report_run(run, sim::run_title(results, i));
     }
   }
-  const fs::path file = directory / "report.html";
-  sim::write_page(file, sim::comparison_report_html(results, title, directory));
+  const fs::path file = directory / kReport;
+  write_atomically(file, sim::comparison_report_html(results, title, directory));
   std::printf("%s (%zu runs)\n", file.c_str(), results.folders.size());
 }
 
@@ -57,6 +61,16 @@ fs::path common_parent(const std::vector<fs::path>& folders) {
   return common;
 }
 
+fs::path folder_of_comparison(const std::vector<fs::path>& folders) {
+  const fs::path directory = common_parent(folders);
+  if (sim::is_run_folder(directory) || sim::is_sweep_folder(directory)) {
+    throw ConfigError(directory.string() +
+                      ": has a report of its own, expected folders side by side");
+  }
+  check_writable(directory / kReport);
+  return directory;
+}
+
 }  // namespace
 
 int report(const ReportArguments& arguments) {
@@ -64,11 +78,16 @@ int report(const ReportArguments& arguments) {
   for (const std::string& name : arguments.folders) {
     std::error_code error;
     const fs::path folder = fs::canonical(name, error);
-    if (error || !(sim::is_run_folder(folder) || sim::is_sweep_folder(folder))) {
-      throw ConfigError(name + ":1: expected a run folder or the folder of a sweep");
+    if (error) throw ConfigError(name + ": " + error.message() + kExpected);
+    if (!fs::is_directory(folder)) throw ConfigError(name + ": is no folder" + kExpected);
+    if (!sim::is_run_folder(folder) && !sim::is_sweep_folder(folder)) {
+      throw ConfigError(name + ": holds neither a run (resolved.yaml) nor a sweep (sweep.json)" +
+                        kExpected);
     }
+    check_writable(folder / kReport);
     folders.push_back(folder);
   }
+  const fs::path directory = folders.size() > 1 ? folder_of_comparison(folders) : fs::path();
   for (const fs::path& folder : folders) {
     if (sim::is_sweep_folder(folder)) {
       report_comparison({folder}, folder, sweep_title(folder), arguments.runs);
@@ -77,11 +96,6 @@ int report(const ReportArguments& arguments) {
     }
   }
   if (folders.size() > 1) {
-    const fs::path directory = common_parent(folders);
-    if (sim::is_run_folder(directory) || sim::is_sweep_folder(directory)) {
-      throw ConfigError(directory.string() +
-                        ":1: has a report of its own, expected folders side by side");
-    }
     report_comparison(folders, directory, std::to_string(folders.size()) + " folders compared",
                       false);
   }

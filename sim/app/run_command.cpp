@@ -1,21 +1,26 @@
 #include <unistd.h>
 
-#include <atomic>
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
+#include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stdexcept>
 #include <vector>
 
 #include "app/commands.h"
+#include "app/host.h"
+#include "app/interrupts.h"
+#include "config/text.h"
+#include "files/files.h"
 #include "report/run_report.h"
 #include "run/recorder.h"
 #include "run/requirement.h"
+#include "run/run_folder.h"
 #include "run/scenario.h"
 #include "run/simulation.h"
 #include "run/summary.h"
@@ -25,9 +30,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::atomic<int> interrupt_signal{0};
-
-void on_signal(int signal) { interrupt_signal = signal; }
+constexpr int kMostThreads = 4;  // unless more are asked for: these keep all lanes busy
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -69,22 +72,108 @@ class ProgressLine {
   Clock::time_point begin_ = Clock::now();
 };
 
-std::filesystem::path run_folder(const RunArguments& arguments, const sim::Scenario& scenario) {
-  if (!arguments.out.empty()) return arguments.out;
-  return std::filesystem::path("runs") /
-         (scenario.name + "-seed" + std::to_string(scenario.config.seed));
+std::unique_ptr<sim::RunFolder> claim_folder(const RunArguments& arguments,
+                                             const sim::Scenario& scenario) {
+  if (!arguments.out.empty()) return std::make_unique<sim::RunFolder>(arguments.out);
+  std::string name = scenario.name + "-seed" + std::to_string(scenario.config.seed);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return sim::RunFolder::first_free(std::filesystem::path("runs") / name, scenario.resolved_yaml());
 }
 
-void print_result(const sim::FlightResult& result, const std::filesystem::path& folder) {
-  const auto outcome = sim::kOutcomeNames[static_cast<std::size_t>(result.outcome)];
-  std::printf("%.*s (%s) after %.1f s and %.1f m, hash %s: %s\n", static_cast<int>(outcome.size()),
-              outcome.data(), result.reason.c_str(), to_seconds(result.duration),
-              result.flight.distance_m, result.trajectory_hash.c_str(), folder.c_str());
+// The flight may take minutes: what cannot be written afterwards is said before.
+void check_outputs(const RunArguments& arguments, const std::filesystem::path& folder) {
+  std::vector<sim::NamedFile> files = sim::files_of_a_run(folder);
+  files.push_back({"the scenario", arguments.scenario.file});
+  if (!arguments.bag.empty()) {
+    files.push_back({"--bag", arguments.bag});
+    files.push_back({"the growing bag", arguments.bag + ".active"});
+  }
+  if (!arguments.junit.empty()) files.push_back({"--junit", arguments.junit});
+  for (const std::string& file : {arguments.bag, arguments.junit}) {
+    if (!file.empty()) check_writable(file);
+  }
+  sim::expect_different_files(files);
 }
 
-int exit_code_of(sim::Outcome outcome) {
-  if (outcome == sim::Outcome::kSucceeded) return 0;
-  return outcome == sim::Outcome::kInterrupted ? 128 + SIGINT : 1;
+/// What a flight leaves: the run folder and, if asked for, a bag. A file that the disk refuses does
+/// not keep the others from being written.
+class Outputs {
+ public:
+  /// @throws DiskError if one of them cannot be begun.
+  void begin(const RunArguments& arguments, const sim::Scenario& scenario,
+             const std::filesystem::path& folder, sim::Simulation& simulation) {
+    if (!arguments.bag.empty()) bag_.emplace(arguments.bag, scenario.config.stack.vehicle);
+    recorder_.emplace(folder, scenario.resolved_yaml());
+    simulation.record_to(*recorder_);
+    if (bag_) simulation.record_to(*bag_);
+  }
+  /// Does it, and remembers what went wrong: the others are still to be written.
+  void attempt(const std::function<void()>& write) {
+    try {
+      write();
+    } catch (const std::exception& error) {
+      failed(error);
+    }
+  }
+  void failed(const std::exception& error) { failures_.emplace_back(error.what()); }
+  void close_bag() {
+    if (bag_ && failures_.empty()) attempt([&] { bag_->close(); });
+  }
+  sim::Recorder& recorder() { return *recorder_; }
+  [[nodiscard]] std::vector<std::string> failures() const {
+    std::vector<std::string> all = failures_;
+    for (std::string& failure : recorder_->failures()) all.push_back(std::move(failure));
+    return all;
+  }
+
+ private:
+  std::optional<sim::BagWriter> bag_;
+  std::optional<sim::Recorder> recorder_;
+  std::vector<std::string> failures_;
+};
+
+void fly(sim::Simulation& simulation, Outputs& outputs, bool quiet) {
+  ProgressLine progress(!quiet);
+  // A flight that is not recorded is not worth flying: it ends where the disk refuses.
+  try {
+    while (simulation.tick()) {
+      if (Interrupts::signal() != 0) simulation.interrupt("signal");
+      if (outputs.recorder().failed()) simulation.interrupt(printable(outputs.failures().front()));
+      progress.update(simulation);
+    }
+  } catch (const DiskError& error) {  // of the bag
+    outputs.failed(error);
+    simulation.interrupt(printable(error.what()));
+  }
+}
+
+// Before the summary: what it does not say yet of the flight, and whether it is all there.
+nlohmann::ordered_json write_results(const sim::Scenario& scenario, const sim::FlightResult& result,
+                                     const sim::HostTime& host, Outputs& outputs) {
+  sim::Recorder& recorder = outputs.recorder();
+  recorder.write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
+  if (result.coverage) {
+    recorder.write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
+  }
+  recorder.write_file("timing.csv", sim::timing_csv(result.timing));
+  outputs.close_bag();
+  recorder.flush();
+  nlohmann::ordered_json summary = sim::summarise(scenario, result, host);
+  if (const auto failures = outputs.failures(); !failures.empty()) summary["unwritten"] = failures;
+  recorder.write_summary(summary);
+  return summary;
+}
+
+void print_result(const sim::FlightResult& result, const std::filesystem::path& shown) {
+  const std::string outcome(sim::kOutcomeNames[static_cast<std::size_t>(result.outcome)]);
+  std::printf("%s: %s\n  time %.1f s, distance %.1f m, ", outcome.c_str(),
+              printable(result.reason).c_str(), to_seconds(result.duration),
+              result.flight.distance_m);
+  if (result.coverage) std::printf("explored %.1f %%, ", 100 * result.coverage->area_fraction);
+  std::printf("odometry error %.3f m, clearance %.2f m\n  hash %s\n  %s\n",
+              result.flight.odometry.ate_rmse_m, result.flight.clearance.min_m,
+              result.trajectory_hash.c_str(), printable(shown.string()).c_str());
+  flush_standard_output();
 }
 
 std::vector<sim::Requirement> parse_requirements(const RunArguments& arguments) {
@@ -95,15 +184,6 @@ std::vector<sim::Requirement> parse_requirements(const RunArguments& arguments) 
   return requirements;
 }
 
-// The flight may take minutes: that its verdict cannot be written is said before.
-void check_writable(const std::string& file) {
-  if (file.empty()) return;
-  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
-  if (access(folder.c_str(), W_OK) != 0 || std::filesystem::is_directory(file)) {
-    throw ConfigError(file + ": cannot be written, expected a file in a folder that exists");
-  }
-}
-
 /// @return whether every requirement is met; one line for each that is not.
 bool judge(const std::vector<sim::Requirement>& requirements,
            const nlohmann::ordered_json& summary) {
@@ -112,16 +192,24 @@ bool judge(const std::vector<sim::Requirement>& requirements,
     const std::string violation = sim::violation(requirement, summary);
     if (violation.empty()) continue;
     all = false;
-    std::fprintf(stderr, "arex: required %s, but %s\n", requirement.text.c_str(),
+    std::fprintf(stderr, "arex: required %s, but %s\n", printable(requirement.text).c_str(),
                  violation.c_str());
   }
   return all;
 }
 
-void write_junit(const std::string& file, const std::string& xml) {
-  std::ofstream stream(file);
-  stream << xml;
-  if (!stream.flush()) throw std::runtime_error(file + ": cannot be written");
+/// One line of what went wrong, which no report and no result line replaces.
+void complain(const sim::FlightResult& result, const std::vector<std::string>& failures,
+              bool quiet) {
+  if (!failures.empty()) {
+    const std::string more =
+        failures.size() == 1 ? "" : " (and " + std::to_string(failures.size() - 1) + " more)";
+    std::fprintf(stderr, "arex: %s%s\n", printable(failures.front()).c_str(), more.c_str());
+  } else if (quiet && result.outcome != sim::Outcome::kSucceeded) {
+    const std::string outcome(sim::kOutcomeNames[static_cast<std::size_t>(result.outcome)]);
+    std::fprintf(stderr, "arex: %s after %.1f s: %s\n", outcome.c_str(),
+                 to_seconds(result.duration), printable(result.reason).c_str());
+  }
 }
 
 }  // namespace
@@ -129,52 +217,42 @@ void write_junit(const std::string& file, const std::string& xml) {
 int run(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   const double cpu_begin = cpu_seconds();
+  const Interrupts interrupts;
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the progress may leave: the flight goes on
   sim::Scenario scenario = sim::load_scenario(arguments.scenario.file, arguments.scenario.overrides,
                                               arguments.scenario.seed);
-  if (!arguments.name.empty()) scenario.name = arguments.name;
-  const std::filesystem::path folder = run_folder(arguments, scenario);
+  scenario.name = printable(arguments.name.empty() ? scenario.name : arguments.name);
   const std::vector<sim::Requirement> requirements = parse_requirements(arguments);
-  check_writable(arguments.junit);
+  const std::unique_ptr<sim::RunFolder> folder = claim_folder(arguments, scenario);
+  check_outputs(arguments, folder->path());
 
-  // The world is built before anything is written: a bad recipe leaves nothing.
-  sim::Simulation simulation(scenario, arguments.threads);
-  std::optional<sim::BagWriter> bag;
-  std::optional<sim::Recorder> recorder;
-  try {
-    if (!arguments.bag.empty()) bag.emplace(arguments.bag, scenario.config.stack.vehicle);
-    recorder.emplace(folder, scenario.resolved_yaml());
-  } catch (const std::runtime_error& error) {
-    throw ConfigError(error.what());  // a path that cannot be written is bad input
-  }
-  simulation.record_to(*recorder);
-  if (bag) simulation.record_to(*bag);
-
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
-  {
-    ProgressLine progress(!arguments.quiet);
-    while (simulation.tick()) {
-      if (interrupt_signal != 0) simulation.interrupt("signal");
-      progress.update(simulation);
-    }
-  }
+  // The world is built before anything is written: a bad recipe leaves nothing. The outputs live
+  // longer than the simulation, whose jobs may write to them until its end.
+  Outputs outputs;
+  sim::Simulation simulation(
+      scenario, arguments.threads > 0 ? arguments.threads : std::min(cores(), kMostThreads));
+  outputs.begin(arguments, scenario, folder->path(), simulation);
+  fly(simulation, outputs, arguments.quiet);
   const sim::FlightResult result = simulation.finish();
-  if (bag) bag->close();
-  recorder->write_file("odometry_error.csv", sim::odometry_error_csv(result.flight.poses));
-  if (result.coverage) {
-    recorder->write_file("coverage.csv", sim::write_coverage_csv(result.coverage->rows));
-  }
-  recorder->write_file("timing.csv", sim::timing_csv(result.timing));
   const nlohmann::ordered_json summary =
-      sim::summarise(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin});
-  recorder->write_summary(summary);
-  if (arguments.report) sim::write_run_report(folder);
-  if (!arguments.quiet) print_result(result, folder);
+      write_results(scenario, result, {seconds_since(begin), cpu_seconds() - cpu_begin}, outputs);
+
+  // Whoever stops us after the flight does not wait for its report.
+  const bool stopped = Interrupts::signal() != 0 && result.outcome != sim::Outcome::kInterrupted;
+  const bool report = arguments.report && !stopped;
+  if (report) outputs.attempt([&] { sim::write_run_report(folder->path()); });
   if (!arguments.junit.empty()) {
-    write_junit(arguments.junit, sim::junit_xml(summary, requirements));
+    outputs.attempt(
+        [&] { write_atomically(arguments.junit, sim::junit_xml(summary, requirements)); });
   }
-  const int exit_code = exit_code_of(result.outcome);
-  return judge(requirements, summary) || exit_code != 0 ? exit_code : 1;
+  if (!arguments.quiet) {
+    outputs.attempt(
+        [&] { print_result(result, report ? folder->path() / "report.html" : folder->path()); });
+  }
+  complain(result, outputs.failures(), arguments.quiet);
+  const bool met = judge(requirements, summary);
+  if (Interrupts::signal() != 0) return 128 + SIGINT;
+  return met && outputs.failures().empty() && result.outcome == sim::Outcome::kSucceeded ? 0 : 1;
 }
 
 }  // namespace arex::app

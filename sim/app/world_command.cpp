@@ -1,8 +1,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 #include "app/commands.h"
+#include "run/file_io.h"
 #include "run/scenario.h"
 #include "worlds/export.h"
 #include "worlds/recipes.h"
@@ -43,6 +45,15 @@ void check_size(const ConfigNode& root, const worlds::World& world, double resol
   config_detail::fail(config_detail::locate_rule(root, text.data()), text.data());
 }
 
+// What a run has there would be half replaced.
+void expect_no_run(const std::filesystem::path& folder) {
+  for (const char* name : {"resolved.yaml", "sweep.json"}) {
+    if (!std::filesystem::exists(folder / name)) continue;
+    throw ConfigError(folder.string() + ": holds " + name +
+                      ", so that it is a run's or a sweep's; expected a folder of its own");
+  }
+}
+
 }  // namespace
 
 int world(const WorldArguments& arguments) {
@@ -58,6 +69,9 @@ int world(const WorldArguments& arguments) {
     if (arguments.seed) sim::set_seed(root, *arguments.seed, "--seed");
     read_config(root, recipe);
   }
+  const sim::OutputFolder folder(arguments.out);
+  expect_no_run(folder.path());
+  for (const std::string_view file : worlds::kExportedFiles) check_writable(folder.path() / file);
   const worlds::World built = build(root, recipe);
   check_size(root, built, recipe.exported.resolution_m);
   worlds::export_world(built, recipe.exported, arguments.out);

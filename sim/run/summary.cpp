@@ -51,8 +51,8 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("battery.used_wh", result.battery.used_wh);
   figures.set("battery.remaining_fraction", result.battery.state_of_charge);
   if (!result.renderer.empty()) figures.set("renderer", result.renderer);
-  figures.set("build.version", AREX_VERSION);
-  figures.set("build.compiler", "g++ " __VERSION__);
+  figures.set("build.version", build_version());
+  figures.set("build.compiler", build_compiler());
 }
 
 void add_flight(const FlightScore& flight, Figures& figures) {
@@ -103,6 +103,14 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   if (result.coverage) add_figures(*result.coverage, figures);
   result.exploration.add_figures(figures);
   return figures.json();
+}
+
+std::string build_version() { return AREX_VERSION; }
+
+std::string build_compiler() { return "g++ " __VERSION__; }
+
+std::string json_text(const ordered_json& json) {
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 std::vector<std::pair<std::string, std::string>> flatten(const ordered_json& summary) {

@@ -22,6 +22,13 @@ struct HostTime {
 nlohmann::ordered_json summarise(const Scenario& scenario, const FlightResult& result,
                                  const HostTime& host);
 
+/// Version with the commit it was built from, and compiler, as summaries name them.
+std::string build_version();
+std::string build_compiler();
+
+/// A file's text of it. Bytes that are no UTF-8, as a file's name may have, become U+FFFD.
+std::string json_text(const nlohmann::ordered_json& json);
+
 /// Every number and text of a summary with its dotted key; a list by its length, `targets.count`.
 std::vector<std::pair<std::string, std::string>> flatten(const nlohmann::ordered_json& summary);
 

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "config/config.h"
+
 namespace arex::sim {
 namespace {
 
@@ -18,6 +20,7 @@ namespace {
 void pin_llvmpipe(const EglOptions& options) {
   static std::once_flag pinned;
   std::call_once(pinned, [&options] {
+    setenv("EGL_LOG_LEVEL", "fatal", 0);  // what fails is said by us, once
     setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
     setenv("LP_NUM_THREADS", std::to_string(options.rasterizer_threads).c_str(), 1);
   });
@@ -104,7 +107,9 @@ EglContext::EglContext(const EglOptions& options) : impl_(std::make_unique<Impl>
     break;
   }
   if (impl_->context == EGL_NO_CONTEXT) {
-    throw std::runtime_error("no EGL platform offers a headless OpenGL 4.5 context");
+    throw ConfigError(
+        "no EGL platform offers a headless OpenGL 4.5 context, expected a GPU's driver " +
+        std::string("or Mesa's (libegl1, libegl-mesa0, libgl1-mesa-dri)"));
   }
   const Current current(*this);
   renderer_name_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));

@@ -23,7 +23,7 @@ struct EglOptions {
 /// thread may draw, and none of them owns the context.
 class EglContext {
  public:
-  /// @throws std::runtime_error if no EGL platform gives OpenGL 4.5.
+  /// @throws ConfigError, of the host, if no EGL platform gives OpenGL 4.5.
   explicit EglContext(const EglOptions& options);
   ~EglContext();
   EglContext(const EglContext&) = delete;

@@ -313,15 +313,120 @@ TEST(CommandLine, AKilledRunLeavesNothingThatLooksFinished) {
   EXPECT_NE(read_text(folder / "run/events.csv").find("mission_state"), std::string::npos);
 }
 
-TEST(CommandLine, ReportNamesAFolderWithoutARun) {
+TEST(CommandLine, ReportTellsWhatIsMissingFromWhatIsNoRun) {
   const TemporaryFolder folder;
-  const std::string name = folder.path().string();
-  for (const std::string& bad : {name, name + "/nowhere"}) {
-    const Result result = run({"report", bad});
+  std::filesystem::create_directory(folder / "empty");
+  write_text(folder / "file", "");
+  const auto said = [&](const char* name) {
+    const Result result = run({"report", (folder / name).string()});
+    EXPECT_EQ(result.exit_code, 2) << name;
+    return result.err.substr(std::min(result.err.size(), folder.path().string().size() + 1));
+  };
+  const std::string expected = ", expected a run folder or the folder of a sweep\n";
+  EXPECT_EQ(said("nowhere"), "nowhere: No such file or directory" + expected);
+  EXPECT_EQ(said("file"), "file: is no folder" + expected);
+  EXPECT_EQ(said("empty"),
+            "empty: holds neither a run (resolved.yaml) nor a sweep (sweep.json)" + expected);
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "empty"));
+}
+
+TEST(CommandLine, NamesTheNearestCommandAndOption) {
+  const auto said = [](const std::vector<std::string>& arguments) {
+    const Result result = run(arguments);
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_EQ(result.err, bad + ":1: expected a run folder or the folder of a sweep\n");
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    return result.err;
+  };
+  EXPECT_EQ(said({"runn", "x.yaml"}),
+            "arex: unknown command 'runn'; did you mean 'run'? See arex --help\n");
+  EXPECT_NE(said({"swep"}).find("did you mean 'sweep'?"), std::string::npos);
+  EXPECT_EQ(said({"run", kWaypoints, "--quite"}),
+            "arex run: unknown option '--quite'; did you mean '--quiet'? See arex run --help\n");
+  EXPECT_NE(said({"sweep", "x.yaml", "--jbos=3"}).find("did you mean '--jobs'?"),
+            std::string::npos);
+  EXPECT_NE(said({"pattern", "--shot", "3"}).find("did you mean '--shots'?"), std::string::npos);
+  // What does not belong on a terminal does not get there.
+  EXPECT_EQ(said({"\x1b[31mrun"}).find('\x1b'), std::string::npos);
+}
+
+TEST(CommandLine, SaysItsVersion) {
+  const Result result = run({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out.find("arex 0."), 0u) << result.out;
+  EXPECT_NE(result.out.find("compiled by g++ "), std::string::npos) << result.out;
+}
+
+// A tenth of a second that ends by timed_out.
+std::vector<std::string> short_run(const TemporaryFolder& folder) {
+  return {"run",   kWaypoints,
+          "--set", "mission.max_time_s=0.1",
+          "--set", "devices.lidar=false",
+          "--set", "odometry.source=mocap",
+          "--set", "mapping.use_depth=false",
+          "--out", (folder / "run").string()};
+}
+
+TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
+  const TemporaryFolder folder;
+  std::vector<std::string> arguments = short_run(folder);
+  const Result loud = run(arguments);
+  EXPECT_EQ(loud.exit_code, 1);
+  EXPECT_EQ(loud.out.find("timed_out: "), 0u) << loud.out;
+  for (const char* figure : {"time 0.1 s", "distance ", "odometry error ", "clearance "}) {
+    EXPECT_NE(loud.out.find(figure), std::string::npos) << loud.out;
   }
-  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  EXPECT_NE(loud.out.find((folder / "run/report.html").string()), std::string::npos) << loud.out;
+  arguments.emplace_back("--quiet");
+  const Result quiet = run(arguments);
+  EXPECT_EQ(quiet.exit_code, 1);
+  EXPECT_EQ(quiet.out, "");
+  EXPECT_EQ(quiet.err.find("arex: timed_out after 0.1 s: "), 0u) << quiet.err;
+  EXPECT_EQ(std::count(quiet.err.begin(), quiet.err.end(), '\n'), 1) << quiet.err;
+}
+
+TEST(CommandLine, ACloudThatIsCutIsAnEvent) {
+  const TemporaryFolder folder;
+  const Result result =
+      run({"run", kWaypoints, "--quiet", "--no-report", "--set", "mission.max_time_s=4", "--set",
+           "odometry.source=mocap", "--set", "mapping.use_depth=false", "--set",
+           "mapping.cloud.max_points=1000", "--out", (folder / "run").string()});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const std::string events = read_text(folder / "run/events.csv");
+  const auto at = events.find(",map_full,");
+  ASSERT_NE(at, std::string::npos) << events;
+  EXPECT_EQ(events.find(",map_full,", at + 1), std::string::npos) << "once";
+}
+
+TEST(CommandLine, ParametersListTheNamesThatTheyMayHave) {
+  const std::string params = run({"params"}).out;
+  const auto line_of = [&](const std::string& key) {
+    const auto at = params.find(key + " ");
+    return params.substr(at, params.find('\n', at) - at);
+  };
+  EXPECT_NE(line_of("mission.kind").find("(explore|"), std::string::npos)
+      << line_of("mission.kind");
+  EXPECT_NE(line_of("odometry.source").find("|mocap"), std::string::npos);
+  EXPECT_NE(line_of("world.kind").find("forest|"), std::string::npos);
+}
+
+TEST(CommandLine, RenderRefusesMomentsOutsideOfTheFlight) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run(short_run(folder)).exit_code, 1);
+  const auto expect = [&](const std::vector<std::string>& options, const char* file,
+                          const std::string& said) {
+    std::vector<std::string> arguments{"render", (folder / "run").string(), "--out",
+                                       (folder / file).string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Result result = run(arguments);
+    EXPECT_EQ(result.exit_code, 2) << said;
+    EXPECT_NE(result.err.find(said), std::string::npos) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / file));
+  };
+  expect({"--time", "1000"}, "x.png", "--time 1000: lies outside of the flight");
+  expect({"--time", "-1"}, "x.png", "--time -1: lies outside of the flight");
+  expect({"--from", "1000"}, "x.mp4", "--from 1000: lies behind the end of the flight");
+  expect({"--from", "0.08", "--to", "0.02"}, "x.mp4", "--from 0.08: lies behind --to 0.02");
+  expect({"--to", "-3"}, "x.mp4", "--to -3: lies before the start of the flight");
 }
 
 TEST(CommandLine, ReportsUnfinishedRunsAndComparesSeveral) {
@@ -344,7 +449,11 @@ TEST(CommandLine, RenderRefusesWhatItCannotDraw) {
             "--out " + name + "/x.gif: expected FILE.png or FILE.mp4\n");
   const Result result = run({"render", name, "--out", name + "/x.mp4"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_EQ(result.err, name + "/truth.tum:1: holds no pose, expected a flown run\n");
+  EXPECT_EQ(result.err, name + ": holds no run, expected a run folder\n");
+  write_text(folder / "resolved.yaml", "seed: 1\n");
+  EXPECT_EQ(run({"render", name, "--out", name + "/x.mp4"}).err,
+            name + "/truth.tum: holds no flight, expected two poses and more\n");
+  std::filesystem::remove(folder / "resolved.yaml");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

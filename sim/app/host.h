@@ -1,0 +1,16 @@
+#pragma once
+
+/// What the host gives to this process.
+namespace arex::app {
+
+/// Cores that it may run on.
+int cores();
+
+/// Opens /dev/null where standard input, output or error are closed: otherwise the next file to be
+/// opened gets their number, and what is meant for people lands in it.
+void open_standard_streams();
+
+/// @throws DiskError if something printed so far did not get out.
+void flush_standard_output();
+
+}  // namespace arex::app

@@ -31,8 +31,13 @@ ScanJob LidarInertialOdometry::prepare(const LidarScanPtr& scan) {
 
 void LidarInertialOdometry::apply(const ScanUpdate& update) {
   scan_status_ = update.status;
+  scan_need_ = update.need;
   odometry_.correction_stamp = update.correction_stamp;
-  if (update.status == OdometryStatus::kInitialising) return;
+  if (update.status == OdometryStatus::kInitialising) {
+    predictor_ = {};  // of a start that is taken back
+    odometry_.status = update.status;
+    return;
+  }
   predictor_.anchor(update.stamp, update.state, update.accel_scale, update.gyro);
   publish();
 }
@@ -41,6 +46,13 @@ ScanUpdate LidarInertialOdometry::add_scan(const LidarScanPtr& scan) {
   ScanUpdate update = correct(prepare(scan));
   apply(update);
   return update;
+}
+
+OdometryNeed LidarInertialOdometry::need() const {
+  if (odometry_.status == OdometryStatus::kOk) return OdometryNeed::kNothing;
+  const bool silent =
+      to_seconds(newest_.stamp - odometry_.correction_stamp) > health_.degenerate_silence_s;
+  return silent && scan_status_ != OdometryStatus::kInitialising ? OdometryNeed::kScan : scan_need_;
 }
 
 void LidarInertialOdometry::publish() {

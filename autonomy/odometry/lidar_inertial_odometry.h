@@ -43,8 +43,11 @@ class LidarInertialOdometry {
   /// The three steps at once.
   ScanUpdate add_scan(const LidarScanPtr& scan);
 
-  /// The newest estimate; kInitialising before the first scan update.
+  /// The newest estimate; kInitialising before the first scan update, and again when a start is
+  /// taken back: that may happen until the vehicle moves for the first time.
   [[nodiscard]] const Odometry& odometry() const { return odometry_; }
+  /// What keeps it from being ok; no scan has come yet, as long as nothing else is known.
+  [[nodiscard]] OdometryNeed need() const;
   [[nodiscard]] const SurfelMap& map() const { return corrector_.map(); }
 
  private:
@@ -58,6 +61,7 @@ class LidarInertialOdometry {
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;
   OdometryStatus scan_status_ = OdometryStatus::kInitialising;
+  OdometryNeed scan_need_ = OdometryNeed::kScan;
   Odometry odometry_;
 };
 

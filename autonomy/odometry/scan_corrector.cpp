@@ -36,6 +36,7 @@ ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured) {
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
                              double body_radius_m)
     : config_(config),
+      configured_imu_(config.imu),
       X_BL_(X_BL),
       body_radius_m_(body_radius_m),
       filter_(config.imu),
@@ -47,6 +48,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   ScanUpdate update;
   update.begin = job.scan->stamp;
   update.stamp = job.scan->end;
+  if (stood_at_ && misses_imu(samples_until(update.stamp), update.stamp)) start_again();
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
@@ -56,16 +58,19 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
     judge(update);
     std::vector<Vec3f> points_O;
     std::vector<float> fractions;
-    if (update.registration.accepted && status_ != OdometryStatus::kLost) {
+    if (update.registration.accepted && status_ != OdometryStatus::kLost &&
+        doubtful_in_a_row_ == 0) {
       points_O = to_O(points);
       fractions = fractions_of(*job.scan, points);
-      if (confirmations_left_ == 0 && doubtful_in_a_row_ == 0) insert(points, points_O);
+      if (confirmations_left_ == 0) insert(points, points_O);
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
     update.fractions = std::make_shared<const std::vector<float>>(std::move(fractions));
+    if (status_ == OdometryStatus::kLost && stood_at_) start_again();
   }
   update.correction_stamp = correction_stamp_;
   update.status = status_;
+  update.need = need_;
   update.state = filter_.state();
   update.covariance = filter_.covariance();
   update.accel_scale = accel_scale_;
@@ -79,33 +84,64 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   std::erase_if(standing_scans_, [&](const LidarScanPtr& s) { return s->stamp < window_begin; });
   const auto until = std::upper_bound(imu_.begin(), imu_.end(), scan->end,
                                       [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  const auto start = start_from_standstill({imu_.begin(), until}, X_BL_, config_);
-  if (!start) {
+  const std::span<const ImuSample> samples(imu_.begin(), until);
+  need_ = misses_imu(samples, scan->end) ? OdometryNeed::kImu
+                                         : missing_for_start(samples, config_.initialiser);
+  const auto standing = start_from_standstill(samples, X_BL_, config_);
+  if (need_ == OdometryNeed::kNothing && standing && !start(*standing, scan->end)) {
+    need_ = scan->points.empty() ? OdometryNeed::kScan : OdometryNeed::kReference;
+  }
+  if (need_ != OdometryNeed::kNothing) {
     // One window and what a late scan may lack.
     forget_imu_before(window_begin - from_seconds(0.2));
     return;
   }
-  white_noise_ = start->white_noise;
-  config_.imu = graded(config_.imu, white_noise_);
-  filter_ = ErrorStateFilter(config_.imu);
-  filter_.reset(start->state, start->covariance);
-  accel_scale_ = start->accel_scale;
-  stamp_ = correction_stamp_ = scan->end;
-  corrected_position_ = filter_.state().p_OB;
-  // Held so tightly, a wrong mounting would be found far more slowly.
-  if (!config_.estimate_extrinsics) stood_at_ = filter_.state().X_OB();
   status_ = OdometryStatus::kOk;
-  for (const LidarScanPtr& standing : standing_scans_) {
-    MotionSegment still;
-    still.begin = standing->stamp;
-    still.end = standing->end;
-    still.X_OB = filter_.state().X_OB();
-    const std::vector<ScanPoint> points =
-        undistort(*standing, {still}, X_BL_, config_.lidar, body_radius_m_);
-    insert(points, to_O(points));
-  }
   standing_scans_.clear();
   forget_imu_before(stamp_);
+}
+
+bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
+  white_noise_ = standing.white_noise;
+  config_.imu = graded(configured_imu_, white_noise_);
+  filter_ = ErrorStateFilter(config_.imu);
+  filter_.reset(standing.state, standing.covariance);
+  accel_scale_ = standing.accel_scale;
+  std::vector<ScanPoint> points;
+  for (const LidarScanPtr& scan : standing_scans_) {
+    MotionSegment still;
+    still.begin = scan->stamp;
+    still.end = scan->end;
+    still.X_OB = filter_.state().X_OB();
+    points = undistort(*scan, {still}, X_BL_, config_.lidar, body_radius_m_);
+    insert(points, to_O(points));
+  }
+  // A filter that no scan can correct runs away within seconds.
+  ErrorStateFilter tried = filter_;
+  points = thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+  if (!register_scan(points, map_, config_, tried).accepted) {
+    map_ = SurfelMap(config_.map);
+    return false;
+  }
+  stamp_ = correction_stamp_ = stamp;
+  corrected_position_ = filter_.state().p_OB;
+  stood_at_ = filter_.state().X_OB();
+  return true;
+}
+
+bool ScanCorrector::misses_imu(std::span<const ImuSample> samples, Stamp until) const {
+  if (samples.empty()) return true;
+  const Stamp delay = from_seconds(config_.imu.delay_s);
+  return until - delay - samples.back().stamp > kMaxImuGap || has_gap(samples);
+}
+
+void ScanCorrector::start_again() {
+  map_ = SurfelMap(config_.map);
+  stood_at_.reset();
+  status_ = OdometryStatus::kInitialising;
+  need_ = OdometryNeed::kReference;
+  refused_in_a_row_ = doubtful_in_a_row_ = confirmations_left_ = 0;
+  gyro_.missing_radps = Vec3::Zero();
 }
 
 std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan,
@@ -155,15 +191,20 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
   return segments;
 }
 
-void ScanCorrector::hold_standstill(Stamp until) {
+std::span<const ImuSample> ScanCorrector::samples_until(Stamp until) const {
   const auto after = [](Stamp t, const ImuSample& s) { return t < s.stamp; };
   const auto begin = std::upper_bound(imu_.begin(), imu_.end(), stamp_, after);
-  const auto end = std::upper_bound(begin, imu_.end(), until, after);
+  return {begin, std::upper_bound(begin, imu_.end(), until, after)};
+}
+
+void ScanCorrector::hold_standstill(Stamp until) {
   const NavigationState& x = filter_.state();
-  if (!stands_still({begin, end}, x, accel_scale_, config_.initialiser, white_noise_)) {
+  if (!stands_still(samples_until(until), x, accel_scale_, config_.initialiser, white_noise_)) {
     stood_at_.reset();
     return;
   }
+  // Held so tightly, a wrong mounting would be found far more slowly.
+  if (config_.estimate_extrinsics) return;
   using Moved = Eigen::Matrix<double, 9, 1>;
   Moved moved;
   moved << so3::Log(x.R_OB.transpose() * stood_at_->R), stood_at_->p - x.p_OB, -x.v_OB;
@@ -200,6 +241,7 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   } else {
     status_ = OdometryStatus::kOk;
   }
+  need_ = status_ == OdometryStatus::kOk ? OdometryNeed::kNothing : OdometryNeed::kReference;
 }
 
 bool ScanCorrector::recover(const std::vector<ScanPoint>& points, RegistrationReport& report) {

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "messages/estimates.h"
@@ -29,6 +30,7 @@ struct ScanUpdate {
   Stamp stamp = 0;
   Stamp correction_stamp = 0;  ///< of the newest scan that corrected the state
   OdometryStatus status = OdometryStatus::kInitialising;
+  OdometryNeed need = OdometryNeed::kImu;  ///< what keeps the status from being ok
   NavigationState state;
   ErrorMatrix covariance = ErrorMatrix::Zero();
   double accel_scale = 1;
@@ -52,7 +54,16 @@ class ScanCorrector {
 
  private:
   void try_start(const LidarScanPtr& scan);
+  /// Places O and makes the first map of the standing scans. @return whether the newest of them can
+  /// be registered against it; otherwise the map is empty again.
+  bool start(const StaticStart& standing, Stamp stamp);
+  /// Forgets the map: whatever it came from, the vehicle has not left the ground yet.
+  void start_again();
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
+  /// The IMU samples since the last scan.
+  [[nodiscard]] std::span<const ImuSample> samples_until(Stamp until) const;
+  /// Whether they have a gap, or end before `until`.
+  [[nodiscard]] bool misses_imu(std::span<const ImuSample> samples, Stamp until) const;
   /// Before take-off the vehicle is where it started: ties the filter to that while it stands.
   void hold_standstill(Stamp until);
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
@@ -63,6 +74,7 @@ class ScanCorrector {
   void forget_imu_before(Stamp stamp);
 
   LidarInertialConfig config_;
+  ImuNoiseConfig configured_imu_;  ///< before it is graded by what the start measures
   Pose X_BL_;
   double body_radius_m_;
   ErrorStateFilter filter_;
@@ -73,7 +85,8 @@ class ScanCorrector {
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
   WhiteNoise white_noise_;                    ///< of the IMU, measured at the start
   std::optional<Pose> stood_at_;              ///< X_OB, until it moves for the first time
-  Stamp stamp_ = 0;                           ///< of the filter's state
+  OdometryNeed need_ = OdometryNeed::kImu;
+  Stamp stamp_ = 0;  ///< of the filter's state
   Stamp correction_stamp_ = 0;
   Vec3 corrected_position_ = Vec3::Zero();
   OdometryStatus status_ = OdometryStatus::kInitialising;

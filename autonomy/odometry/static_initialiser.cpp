@@ -64,6 +64,14 @@ void doubt_mounting(const LidarInertialConfig& config, const NavigationState& x,
   P += T * variance.asDiagonal() * T.transpose();
 }
 
+/// The samples of the last `window_s` before the newest.
+std::span<const ImuSample> newest(std::span<const ImuSample> samples, double window_s) {
+  const Stamp begin = samples.back().stamp - from_seconds(window_s);
+  const auto first = std::lower_bound(samples.begin(), samples.end(), begin,
+                                      [](const ImuSample& s, Stamp t) { return s.stamp < t; });
+  return {first, samples.end()};
+}
+
 /// Roll and pitch that turn the specific force f_B to z; yaw zero.
 Mat3 level(const Vec3& f_B) {
   const double roll = std::atan2(f_B.y(), f_B.z());
@@ -92,21 +100,33 @@ WhiteNoise white_noise(std::span<const ImuSample> samples) {
   return {std::sqrt(gyro * share), std::sqrt(accel * share)};
 }
 
+bool has_gap(std::span<const ImuSample> samples) {
+  return std::adjacent_find(samples.begin(), samples.end(),
+                            [](const ImuSample& a, const ImuSample& b) {
+                              return b.stamp - a.stamp > kMaxImuGap;
+                            }) != samples.end();
+}
+
+OdometryNeed missing_for_start(std::span<const ImuSample> samples,
+                               const StaticInitialiserConfig& config) {
+  if (samples.size() < 2) return OdometryNeed::kImu;
+  const bool whole = samples.front().stamp <= samples.back().stamp - from_seconds(config.window_s);
+  if (!whole || has_gap(samples)) return OdometryNeed::kImu;
+  const Moments m = moments(newest(samples, config.window_s));
+  if (m.gyro_std > config.max_gyro_std_radps) return OdometryNeed::kGyroNoise;
+  if (m.accel_std > config.max_accel_std_mps2) return OdometryNeed::kAccelNoise;
+  if (m.gyro_mean.norm() > config.max_gyro_mean_radps) return OdometryNeed::kGyroBias;
+  if (m.accel_mean.norm() < 0.5 * kGravity) return OdometryNeed::kAccelMagnitude;
+  return OdometryNeed::kNothing;
+}
+
 std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samples,
                                                  const Pose& X_BL,
                                                  const LidarInertialConfig& config) {
   const StaticInitialiserConfig& sc = config.initialiser;
-  if (samples.size() < 2) return std::nullopt;
-  const Stamp begin = samples.back().stamp - from_seconds(sc.window_s);
-  if (samples.front().stamp > begin) return std::nullopt;
-  const auto first = std::lower_bound(samples.begin(), samples.end(), begin,
-                                      [](const ImuSample& s, Stamp t) { return s.stamp < t; });
-  const std::span<const ImuSample> window(first, samples.end());
+  if (missing_for_start(samples, sc) != OdometryNeed::kNothing) return std::nullopt;
+  const std::span<const ImuSample> window = newest(samples, sc.window_s);
   const Moments m = moments(window);
-  if (m.gyro_std > sc.max_gyro_std_radps || m.accel_std > sc.max_accel_std_mps2 ||
-      m.gyro_mean.norm() > sc.max_gyro_mean_radps || m.accel_mean.norm() < 0.5 * kGravity) {
-    return std::nullopt;
-  }
 
   StaticStart start;
   start.stamp = samples.back().stamp;

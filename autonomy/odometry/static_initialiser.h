@@ -3,6 +3,7 @@
 #include <optional>
 #include <span>
 
+#include "messages/odometry_need.h"
 #include "odometry/error_state_filter.h"
 
 namespace arex {
@@ -25,6 +26,17 @@ struct StaticStart {
 
 /// How well the start defines O, rad, m and m/s, 1 sigma: only keeps the filter's algebra regular.
 inline constexpr double kDefinedStd = 1e-5;
+
+/// IMU samples further apart than this, some ten of them missing, are no standstill.
+inline constexpr Stamp kMaxImuGap = kNanosecondsPerSecond / 20;
+
+/// What keeps the samples from being a window of standstill; kNothing: they are one.
+/// @param samples the newest last.
+[[nodiscard]] OdometryNeed missing_for_start(std::span<const ImuSample> samples,
+                                             const StaticInitialiserConfig& config);
+
+/// Whether two neighbouring samples lie further apart than kMaxImuGap.
+[[nodiscard]] bool has_gap(std::span<const ImuSample> samples);
 
 /// Averages a window of standstill. O is placed at B, its z axis against the mean specific force,
 /// B's heading as x: by definition without error. So what an accelerometer bias makes of "down" is

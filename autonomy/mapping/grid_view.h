@@ -9,12 +9,14 @@ namespace arex {
 
 /// What the planner sees of the local grid: a dense box of cells in O, read only.
 /// One byte per cell: bit 0 occupied, bit 1 inside the inflation, bit 2 known (seen free or
-/// occupied). Index as the paper's Id_i: (h * num_w + w) * num_l + l with l along y, w along x, h
-/// along z (paper, Environment Representation).
+/// occupied), bit 3 barred (above the flight's ceiling or below its floor; inflated, too). Index as
+/// the paper's Id_i: (h * num_w + w) * num_l + l with l along y, w along x, h along z (paper,
+/// Environment Representation).
 struct GridView {
   static constexpr std::uint8_t kOccupied = 1;
   static constexpr std::uint8_t kInflated = 2;
   static constexpr std::uint8_t kKnown = 4;
+  static constexpr std::uint8_t kBarred = 8;
 
   const std::uint8_t* cells = nullptr;
   Vec3 low = Vec3::Zero();  ///< lower corner of cell (0, 0, 0), m

@@ -348,6 +348,17 @@ std::shared_ptr<GridSnapshot> LocalGrid::free_snapshot() {
   return snapshots_.back();
 }
 
+void LocalGrid::bar_heights(std::vector<std::uint8_t>& cells) const {
+  const auto layer = static_cast<std::ptrdiff_t>(size_.x()) * size_.y();
+  for (int h = 0; h < size_.z(); ++h) {
+    const double z = (low_.z() + h + 0.5) * resolution_m_;
+    if (z >= floor_m_ && z <= ceiling_m_) continue;
+    std::for_each_n(cells.begin() + h * layer, layer, [](std::uint8_t& flags) {
+      flags = static_cast<std::uint8_t>(flags | GridView::kInflated | GridView::kBarred);
+    });
+  }
+}
+
 std::shared_ptr<const GridSnapshot> LocalGrid::snapshot() {
   const std::shared_ptr<GridSnapshot> out = free_snapshot();
   out->stamp = stamp_;
@@ -370,6 +381,7 @@ std::shared_ptr<const GridSnapshot> LocalGrid::snapshot() {
       write_flags(occupied_.row(h, w), inflated_.row(h, w), known_.row(h, w), length, flags);
     }
   }
+  bar_heights(out->cells);
   out->view.cells = out->cells.data();
   out->view.low = low_.cast<double>() * resolution_m_;
   out->view.resolution_m = resolution_m_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -40,6 +41,12 @@ class LocalGrid {
  public:
   LocalGrid(const LocalGridConfig& config, double inflation_m, double resolution_m);
 
+  /// Bars what lies below and above these heights in O, m, to the planner.
+  void bar_outside(double floor_m, double ceiling_m) {
+    floor_m_ = floor_m;
+    ceiling_m_ = ceiling_m;
+  }
+
   /// Moves the box to the vehicle by whole cells; cells that stay keep their state.
   void recentre(const Vec3& p_OB);
   [[nodiscard]] CellBox box() const { return {low_, low_ + size_}; }
@@ -67,6 +74,7 @@ class LocalGrid {
   void decay_until(Stamp stamp);
   void forget(const CellBox& cells);
   [[nodiscard]] std::shared_ptr<GridSnapshot> free_snapshot();
+  void bar_heights(std::vector<std::uint8_t>& cells) const;
   void address_brick(const Cell& brick);
   [[nodiscard]] std::size_t voxel_in_brick(std::size_t voxel) const;
   [[nodiscard]] std::size_t address(int x, int y, int z) const;
@@ -83,6 +91,8 @@ class LocalGrid {
   Stamp stamp_ = 0;
   std::int64_t decayed_slices_ = 0;
   Vec3 centre_ = Vec3::Zero();
+  double floor_m_ = -std::numeric_limits<double>::infinity();
+  double ceiling_m_ = std::numeric_limits<double>::infinity();
   std::array<std::array<std::size_t, 8>, 3> brick_address_{};  ///< of the brick at hand
   Inflation inflation_;
   BitGrid occupied_;

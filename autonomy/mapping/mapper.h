@@ -25,6 +25,8 @@ class Mapper {
   void integrate(const RegisteredScan& scan) { integrate_globally(*integrate_locally(scan)); }
   /// Into the local grid only; without `use_depth` nothing.
   void integrate(const RegisteredDepth& depth);
+  /// The heights in O between which is flown, m.
+  void bar_outside(double floor_m, double ceiling_m) { local_.bar_outside(floor_m, ceiling_m); }
   /// After a jump of the pose: the local grid starts anew.
   void forget_local() { local_.clear(); }
 

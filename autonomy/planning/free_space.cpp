@@ -165,6 +165,8 @@ GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double rea
   shrunk.cells = cells_.data();
   const Eigen::Vector3i centre = grid.cell_of(p);
   if (!grid.contains(centre)) return shrunk;
+  // Floor and ceiling are no inflation; one who is beyond them has to come back, though.
+  const bool barred = (grid.cells[grid.index(centre)] & GridView::kBarred) != 0;
   const int radius = static_cast<int>(std::ceil(reach_m / grid.resolution_m));
   const double least = vehicle_radius_m / grid.resolution_m + 0.5;  // from centre to centre
   const ClearanceCube cube(grid, centre, radius, static_cast<int>(std::ceil(least)) + 2);
@@ -174,6 +176,7 @@ GridView ShrunkInflation::around(const GridView& grid, const Vec3& p, double rea
     const Eigen::Vector3i cell = centre + cube.offset(i);
     if (!grid.contains(cell) || cube.clearance(i) < kept) continue;
     std::uint8_t& flags = cells_[grid.index(cell)];
+    if ((flags & GridView::kBarred) != 0 && !barred) continue;
     flags = static_cast<std::uint8_t>(flags & ~GridView::kInflated);
   }
   return shrunk;

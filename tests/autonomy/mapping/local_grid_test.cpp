@@ -375,5 +375,21 @@ TEST(MappingConfig, ListsItsParameters) {
   EXPECT_THROW(read_config(parse_yaml("lidar_frames: 11", "x"), config), ConfigError);
 }
 
+TEST(LocalGrid, BarsWhatLiesAboveTheCeilingAndBelowTheFloor) {
+  LocalGrid grid(small_grid(), 0.3, kResolution);
+  grid.bar_outside(0.5, 1.8);
+  for (const double z : {0.2, 1.5, 3.0}) {
+    grid.recentre({0, 0, z});
+    const auto snapshot = grid.snapshot();
+    const GridView& view = snapshot->view;
+    for (int h = 0; h < view.size.z(); ++h) {
+      const Vec3 centre = view.centre_of({3, 4, h});
+      const bool inside = centre.z() > 0.5 && centre.z() < 1.8;
+      const std::uint8_t flags = view.cells[view.index({3, 4, h})];
+      EXPECT_EQ(flags, inside ? 0 : GridView::kInflated | GridView::kBarred) << centre.z();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace arex

@@ -105,5 +105,19 @@ TEST(FreeSpace, InflationShrinksToTheRoomThereIs) {
   EXPECT_GT(freed, 100);
 }
 
+// The inflation gives way to a vehicle inside it; floor and ceiling do not, unless it is beyond.
+TEST(ShrunkInflation, LeavesTheCeilingWhereItIs) {
+  test::TestGrid grid(40, 40, 30);
+  constexpr auto kBeyond = GridView::kInflated | GridView::kBarred;
+  grid.mark({0, 0, 20}, {39, 39, 29}, kBeyond);
+  grid.mark({18, 18, 10}, {22, 22, 19}, GridView::kInflated);
+  ShrunkInflation shrunk;
+  const GridView below = shrunk.around(grid.view(), {2.05, 2.05, 1.85}, 0.8, 0.3, 0);
+  EXPECT_FALSE(below.inflated({2.05, 2.05, 1.95}));
+  EXPECT_TRUE(below.inflated({2.05, 2.05, 2.05}));
+  const GridView above = shrunk.around(grid.view(), {2.05, 2.05, 2.25}, 0.8, 0.3, 0);
+  EXPECT_FALSE(above.inflated({2.05, 2.05, 2.05}));
+}
+
 }  // namespace
 }  // namespace arex

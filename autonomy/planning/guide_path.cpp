@@ -12,6 +12,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMargin = 20;            ///< cells searched around map, start and goal
 constexpr std::size_t kMaxPull = 200;  ///< cells that one straight piece may replace
 constexpr double kBlocked = -1.0;
+/// Ends of partial guides that differ by less in what is left to the target are equally near: a
+/// wall of half a metre with the distance kept from its two sides.
+constexpr double kSameNearness_m = 2.0;
 
 /// The map grown by everything that the search may enter, as the cost of a metre in each cell. Its
 /// outermost cells are blocked: every neighbour of a passable cell is in it.
@@ -146,6 +149,57 @@ std::vector<Vec2> pull_straight(const CostMap& costs, std::span<const Vec2> path
   return kept;
 }
 
+/// Of the cells reached from which no more than `enough_m` are left: from the one that costs least
+/// to get to on, as near to the target as neighbours lead.
+template <class Remaining>
+std::size_t end_at_hand(const CostMap& costs, const std::vector<double>& cost,
+                        const std::vector<bool>& closed, double enough_m,
+                        const Remaining& remaining) {
+  std::size_t end = 0;
+  double least = kInfinity;
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    if (!closed[i] || cost[i] >= least || remaining(costs.cell(i)) > enough_m) continue;
+    least = cost[i];
+    end = i;
+  }
+  for (bool moved = true; moved;) {
+    moved = false;
+    const Eigen::Vector2i here = costs.cell(end);
+    for (int k = 0; k < 9; ++k) {
+      const Eigen::Vector2i there = here + Eigen::Vector2i(k / 3 - 1, k % 3 - 1);
+      if (!costs.contains(there) || !closed[costs.index(there)] ||
+          remaining(there) >= remaining(costs.cell(end))) {
+        continue;
+      }
+      end = costs.index(there);
+      moved = true;
+    }
+  }
+  return end;
+}
+
+/// The point of a polyline nearest to p, and the piece of the polyline that holds it.
+struct Foot {
+  std::size_t piece = 0;
+  Vec3 point = Vec3::Zero();
+};
+
+Foot foot_on(std::span<const Vec3> path, const Vec3& p) {
+  Foot best{0, path.front()};
+  double best_distance = kInfinity;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const Vec3 d = path[i + 1] - path[i];
+    const double u = std::clamp((p - path[i]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
+    const Vec3 foot = path[i] + u * d;
+    // Of equally near feet the later one: a path that returns is not flown twice.
+    if ((foot - p).norm() <= best_distance) {
+      best_distance = (foot - p).norm();
+      best = {i, foot};
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to,
@@ -208,6 +262,7 @@ GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to
     }
   }
   const bool found = closed[goal];
+  if (!found) nearest = end_at_hand(costs, cost, closed, least + kSameNearness_m, remaining);
   result.status = found ? GuideStatus::kFound : GuideStatus::kPartial;
   result.cost = cost[nearest];
   std::vector<Vec2> path;
@@ -236,23 +291,23 @@ std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to
   return lifted;
 }
 
+double length_ahead(std::span<const Vec3> path, const Vec3& p) {
+  if (path.empty()) return 0;
+  const Foot foot = foot_on(path, p);
+  double length = (foot.point - p).norm();
+  Vec3 at = foot.point;
+  for (std::size_t i = foot.piece + 1; i < path.size(); ++i) {
+    length += (path[i] - at).norm();
+    at = path[i];
+  }
+  return length;
+}
+
 Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m) {
   if (path.size() < 2) return path.empty() ? p : path.front();
-  std::size_t best = 0;
-  double best_distance = kInfinity;
-  Vec3 at = path.front();
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-    const Vec3 d = path[i + 1] - path[i];
-    const double u = std::clamp((p - path[i]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
-    const Vec3 foot = path[i] + u * d;
-    // Of equally near feet the later one: a path that returns is not flown twice.
-    if ((foot - p).norm() <= best_distance) {
-      best_distance = (foot - p).norm();
-      best = i;
-      at = foot;
-    }
-  }
-  for (std::size_t i = best; i + 1 < path.size(); ++i) {
+  const Foot foot = foot_on(path, p);
+  Vec3 at = foot.point;
+  for (std::size_t i = foot.piece; i + 1 < path.size(); ++i) {
     const double piece = (path[i + 1] - at).norm();
     if (piece >= ahead_m) return at + (path[i + 1] - at) * (ahead_m / piece);
     ahead_m -= piece;

@@ -56,11 +56,17 @@ struct GuidePath {
 /// unknown, and unknown cells may be crossed at a cost. Start and goal may lie too close to
 /// obstacles: the cells within obstacle_distance_m of either may be crossed unless occupied. Cells
 /// that were flown through may always be crossed.
+/// A target that cannot be reached may be as near from several places: the two sides of a wall, of
+/// which now one, now the other is nearer by a cell as scans come in. The path ends on the side
+/// that costs least to get to, which the way there only makes cheaper.
 [[nodiscard]] GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to,
                                    const GuideConfig& config);
 
 /// Gives a 2D polyline heights, linear in its length.
 [[nodiscard]] std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z);
+
+/// From p to the nearest point of a polyline and along it to its end, m.
+[[nodiscard]] double length_ahead(std::span<const Vec3> path, const Vec3& p);
 
 /// The point of a polyline `ahead_m` further on than its point nearest to p; its end if shorter.
 [[nodiscard]] Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "math/so3.h"
@@ -58,10 +59,16 @@ std::string_view to_string(ReplanState state) {
 }
 
 std::string_view to_string(StuckCause cause) {
-  static constexpr std::array<std::string_view, 8> kNames{
-      "none",          "start_in_inflation", "goal_in_inflation",
-      "no_path",       "optimiser_failed",   "refine_rejected",
-      "odometry_lost", "timed_out"};
+  static constexpr std::array<std::string_view, 10> kNames{"none",
+                                                           "start_in_inflation",
+                                                           "goal_in_inflation",
+                                                           "no_path",
+                                                           "optimiser_failed",
+                                                           "refine_rejected",
+                                                           "odometry_lost",
+                                                           "no_progress",
+                                                           "goal_above_ceiling",
+                                                           "goal_below_floor"};
   return kNames[static_cast<std::size_t>(cause)];
 }
 
@@ -85,7 +92,10 @@ ReplanMachine::ReplanMachine(const ReplanConfig& config, const LocalPlannerConfi
 void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now) {
   target_ = target;
   guide_ = std::move(guide);
-  target_since_ = now;
+  progress_.begin(now);
+  new_guide_ = false;
+  detours_ = 0;
+  shortest_m_ = std::numeric_limits<double>::infinity();
   cause_ = StuckCause::kNone;
   tries_ = 0;
   recoveries_ = {};
@@ -133,6 +143,7 @@ MotionState ReplanMachine::state_at(Stamp stamp, const Odometry& odometry) const
 void ReplanMachine::start_at(const Vec3& p_OB, double yaw_rad, Stamp now) {
   current_ = {hold(p_OB, planner_.config().timing_knot_span_s), now, now};
   next_.reset();
+  track_.clear();  // of another frame, after a jump; flown by somebody else otherwise
   heading_ = {yaw_rad, 0.0};
   enter(ReplanState::kWaitTarget, now);
 }
@@ -152,10 +163,7 @@ void ReplanMachine::tick(const GridView& grid, const Odometry& odometry, Stamp n
   if (!current_.recovery) remember(odometry.X_OB.p);  // a retreat does not lengthen the way back
   if (next_) return;                                  // the newest plan has not taken over yet
 
-  if (has_target() && cause_ == StuckCause::kNone &&
-      to_seconds(now - target_since_) > config_.target_timeout_s) {
-    give_up(StuckCause::kTimedOut, now);
-  }
+  watch_progress(odometry, now);
   switch (state_) {
     case ReplanState::kInit:
       break;
@@ -181,6 +189,40 @@ void ReplanMachine::tick(const GridView& grid, const Odometry& odometry, Stamp n
       }
       break;
   }
+}
+
+double ReplanMachine::way_left(const Vec3& p) const {
+  if (guide_.size() < 2) return (*target_ - p).norm();
+  return length_ahead(guide_, p) + (*target_ - guide_.back()).norm();
+}
+
+void ReplanMachine::watch_progress(const Odometry& odometry, Stamp now) {
+  if (!has_target() || needs_target()) return;
+  const double left = way_left(odometry.X_OB.p);
+  if (left < shortest_m_ - kProgress_m) {
+    shortest_m_ = left;
+    detours_ = 0;
+  }
+  // The old way has turned out to be none. Who finds that again and again, without ever getting
+  // nearer, flies to and fro.
+  if (std::exchange(new_guide_, false) && left > left_m_ + kDetour_m &&
+      detours_ < config_.max_detours) {
+    progress_.lengthen(left);
+    ++detours_;
+  }
+  left_m_ = left;
+  progress_.update(left, now);
+  if (to_seconds(now - progress_.since()) > config_.target_timeout_s) {
+    give_up(cause_of_stall(), now);
+  }
+}
+
+StuckCause ReplanMachine::cause_of_stall() const {
+  const bool partial =
+      guide_.size() >= 2 && (guide_.back() - *target_).head<2>().norm() > config_.goal_tolerance_m;
+  if (partial) return StuckCause::kNoPath;
+  const StuckCause plan = cause_of(last_plan_.status);
+  return plan == StuckCause::kNone ? StuckCause::kNoProgress : plan;
 }
 
 void ReplanMachine::exec_recovery(Stamp now) {

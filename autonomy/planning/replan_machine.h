@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/grid_view.h"
+#include "math/progress_watch.h"
 #include "messages/estimates.h"
 #include "planning/local_planner.h"
 #include "planning/yaw_planner.h"
@@ -32,7 +33,9 @@ enum class StuckCause {
   kOptimiserFailed,
   kRefineRejected,
   kOdometryLost,
-  kTimedOut,
+  kNoProgress,
+  kGoalAboveCeiling,
+  kGoalBelowFloor,
 };
 [[nodiscard]] std::string_view to_string(StuckCause cause);
 
@@ -46,7 +49,8 @@ struct ReplanConfig {
   double planning_latency_s = 0.02;    ///< modelled: a plan begins this much after its tick
   double max_tracking_error_m = 1.0;   ///< beyond, plans start at the vehicle, not the setpoint
   double goal_tolerance_m = 0.3;
-  double target_timeout_s = 120.0;
+  double target_timeout_s = 20.0;     ///< without getting nearer along the guide
+  int max_detours = 8;                ///< longer guides granted without getting nearer at all
   double degenerate_speed_mps = 0.8;  ///< handed down: caution's fraction of the speed limit
   int tries_per_recovery = 3;         ///< plans tried before the next rung
   double back_off_m = 2.0;            ///< along the flown path
@@ -64,7 +68,10 @@ struct ReplanConfig {
     f("planning_latency_s", planning_latency_s, "modelled compute time of a plan");
     f("max_tracking_error_m", max_tracking_error_m, "beyond, plans start at the vehicle");
     f("goal_tolerance_m", goal_tolerance_m, "the target counts as reached");
-    f("target_timeout_s", target_timeout_s, "after which a target is given up");
+    f("target_timeout_s", target_timeout_s,
+      "a target is given up after so long without getting nearer to it along the guide");
+    f("max_detours", max_detours,
+      "how often the way may turn out longer before that must bring the vehicle nearer than ever");
     f("tries_per_recovery", tries_per_recovery, "failed plans before the next recovery");
     f("back_off_m", back_off_m, "distance of a retreat along the flown path");
     f("back_off_speed_mps", back_off_speed_mps, "speed of that");
@@ -115,8 +122,15 @@ class ReplanMachine {
   /// A new target; `guide` is a polyline in O that leads there (empty: straight).
   void set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now);
   /// A better guide to the same target, as the map grows.
-  void set_guide(std::vector<Vec3> guide) { guide_ = std::move(guide); }
+  void set_guide(std::vector<Vec3> guide) {
+    guide_ = std::move(guide);
+    new_guide_ = true;
+  }
   void clear_target(Stamp now);
+  /// Gives the target up: another one is needed.
+  void give_up(StuckCause cause, Stamp now);
+  /// Gives it up where the vehicle gets no nearer to it. tick() asks this, too.
+  void watch_progress(const Odometry& odometry, Stamp now);
 
   /// @pre stamps increase.
   void tick(const GridView& grid, const Odometry& odometry, Stamp now);
@@ -170,7 +184,8 @@ class ReplanMachine {
                                   Stamp now);
   void stop(const GridView& grid, Stamp now, StuckCause cause);
   void adopt(Flight flight);
-  void give_up(StuckCause cause, Stamp now);
+  [[nodiscard]] double way_left(const Vec3& p) const;
+  [[nodiscard]] StuckCause cause_of_stall() const;
   [[nodiscard]] MotionState state_at(Stamp stamp, const Odometry& odometry) const;
   [[nodiscard]] Vec3 local_target(const GridView& grid, const Vec3& from, double horizon_m) const;
   [[nodiscard]] std::optional<double> next_collision(const GridView& grid, double t_s) const;
@@ -185,7 +200,13 @@ class ReplanMachine {
   StuckCause cause_ = StuckCause::kNone;
   std::optional<Vec3> target_;
   std::vector<Vec3> guide_;
-  Stamp target_since_ = 0;
+  static constexpr double kProgress_m = 0.3;  ///< less is what a guide's changes amount to
+  static constexpr double kDetour_m = 1.0;    ///< a guide longer by this is another way
+  ProgressWatch progress_{kProgress_m};
+  bool new_guide_ = false;  ///< since the last look at the progress
+  double left_m_ = 0;       ///< of the way, at the last look
+  double shortest_m_ = 0;   ///< way left, ever, to this target
+  int detours_ = 0;         ///< since it was
 
   Flight current_;
   std::optional<Flight> next_;       ///< takes over at its start

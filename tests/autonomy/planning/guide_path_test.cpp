@@ -143,5 +143,34 @@ TEST(PointAhead, WalksOnFromTheNearestPoint) {
   EXPECT_EQ(point_ahead(path, {3.9, 5.0, 1.9}, 30.0), path.back());
 }
 
+// A goal in a wall is as near from either side: the guide stays on the vehicle's, whichever face
+// looks nearer, and leaves it where the other side is nearer by more than the wall.
+TEST(GuidePath, APartialGuideKeepsItsSideOfAWall) {
+  OccupancyMap2D map = empty_map(200, 150);
+  fill(map, 97, 0, 103, 110, OccupancyMap2D::kOccupied);
+  const Vec2 goal(10.05, 5.05);
+  for (const Vec2& from : {Vec2(5, 5), Vec2(15, 5), Vec2(9, 11), Vec2(11, 11)}) {
+    for (const int face : {96, 104}) {  // one face or the other is a cell further off
+      OccupancyMap2D seen = map;
+      fill(seen, face, 0, face, 110, OccupancyMap2D::kOccupied);
+      const GuidePath path = plan_guide(seen, from, goal, {});
+      ASSERT_EQ(path.status, GuideStatus::kPartial);
+      EXPECT_EQ(path.points.back().x() < goal.x(), from.x() < goal.x()) << from.transpose();
+      EXPECT_LT((path.points.back() - goal).norm(), 0.6);
+    }
+  }
+  fill(map, 60, 0, 96, 90, OccupancyMap2D::kOccupied);  // this side is 4 m thick now
+  EXPECT_GT(plan_guide(map, {5.0, 5.0}, goal, {}).points.back().x(), goal.x());
+}
+
+TEST(GuidePath, WhatIsLeftOfAPathCountsTheWayToIt) {
+  const std::vector<Vec3> path{{0, 0, 0}, {4, 0, 0}, {4, 3, 0}};
+  EXPECT_DOUBLE_EQ(length_ahead(path, {0, 0, 0}), 7);
+  EXPECT_DOUBLE_EQ(length_ahead(path, {1, 2, 0}), 2 + 3 + 3);
+  EXPECT_DOUBLE_EQ(length_ahead(path, {4, 3, 2}), 2);
+  EXPECT_DOUBLE_EQ(length_ahead(std::vector<Vec3>{{1, 1, 1}}, {1, 1, 2}), 1);
+  EXPECT_EQ(length_ahead({}, {1, 1, 2}), 0);
+}
+
 }  // namespace
 }  // namespace arex

@@ -270,16 +270,60 @@ TEST(ReplanMachine, HoldsWhenOdometryIsLost) {
   EXPECT_LT(flight.last_.p_OB.x(), 6.5);
 }
 
-TEST(ReplanMachine, GivesUpATargetAfterItsTime) {
-  test::TestGrid grid(160, 80, 20);
-  ReplanConfig config;
-  config.target_timeout_s = 2.0;
-  ReplanMachine machine(config, LocalPlannerConfig(), YawConfig(), 1);
+TEST(ReplanMachine, GivesUpATargetThatItGetsNoNearerTo) {
+  const test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
   Flight flight(machine, {1.05, 4.05, 1.05});
+  const Vec3 held = flight.odometry_.X_OB.p;
   flight.step(grid.view());
   machine.set_target({14.0, 4.05, 1.05}, {}, flight.now_);
-  flight.run(grid.view(), 30);
-  EXPECT_EQ(machine.cause(), StuckCause::kTimedOut);
+  for (int i = 0; i < 3000 && !machine.needs_target(); ++i) {
+    flight.step(grid.view());
+    flight.odometry_.X_OB.p = held;  // by a gust, say: plans succeed, the vehicle stays
+  }
+  EXPECT_EQ(machine.cause(), StuckCause::kNoProgress);
+  EXPECT_NEAR(to_seconds(flight.now_), ReplanConfig().target_timeout_s, 1.0);
+}
+
+TEST(ReplanMachine, ALongWayRoundIsProgress) {
+  // 44 m of guide, 22 s and more, to a target 2 m away: never nearer to it for most of that.
+  const test::TestGrid grid(260, 80, 20);
+  ReplanConfig config;
+  config.target_timeout_s = 3.0;
+  ReplanMachine machine(config, LocalPlannerConfig(), YawConfig(), 1);
+  Flight flight(machine, {1.55, 3.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({1.55, 5.05, 1.05},
+                     {{1.55, 3.05, 1.05}, {23, 3.05, 1.05}, {23, 5.05, 1.05}, {1.55, 5.05, 1.05}},
+                     flight.now_);
+  flight.run(grid.view(), 90);
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1) << to_string(machine.cause());
+}
+
+// The way turns out longer once: honest. A guide that changes sides each time the vehicle gets near
+// would look like progress for ever.
+TEST(ReplanMachine, FlyingToAndFroIsNoProgress) {
+  const test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {4.05, 4.05, 1.05});
+  flight.step(grid.view());
+  const Vec3 target(8.05, 9.5, 1.05);  // beyond the grid, behind a wall
+  const std::vector<Vec3> left{{1.55, 4.05, 1.05}, {1.55, 7, 1.05}},
+      right{{14.55, 4.05, 1.05}, {14.55, 7, 1.05}};
+  machine.set_target(target, left, flight.now_);
+  bool to_left = true;
+  for (int i = 0; i < 30000 && !machine.needs_target(); ++i) {
+    flight.step(grid.view());
+    const Vec3& p = flight.odometry_.X_OB.p;
+    if ((p - (to_left ? left : right).front()).norm() < 1.5) {
+      to_left = !to_left;
+      std::vector<Vec3> guide = to_left ? left : right;
+      guide.insert(guide.begin(), p);
+      machine.set_guide(std::move(guide));
+    }
+  }
+  EXPECT_EQ(machine.cause(), StuckCause::kNoPath);
+  EXPECT_LT(to_seconds(flight.now_), 150);
 }
 
 TEST(ReplanMachine, GivesUpABlockedTargetOnlyIfItStillIsBlockedOnArrival) {

@@ -12,6 +12,14 @@ std::string describe(const Vec3& p) {
   return buffer.data();
 }
 
+/// What keeps the vehicle from arming; empty: nothing.
+std::string_view missing(const Mission::Inputs& inputs) {
+  if (inputs.odometry.status != OdometryStatus::kOk) {
+    return kOdometryNeedNames[static_cast<std::size_t>(inputs.need)];
+  }
+  return inputs.autopilot_ready ? "" : "autopilot";
+}
+
 }  // namespace
 
 Mission::Mission(const MissionConfig& config, EventSink events)
@@ -27,16 +35,10 @@ MotionRequest Mission::update(const Inputs& inputs) {
   watch_odometry(inputs);
   switch (state_) {
     case MissionState::kInitialise:
-      if (inputs.now >= from_seconds(config_.settle_s) && inputs.autopilot_ready &&
-          inputs.odometry.status == OdometryStatus::kOk) {
-        enter(MissionState::kTakeoff, inputs);
-      }
+      wait_until_ready(inputs);
       break;
     case MissionState::kTakeoff:
-      if (has_arrived(inputs)) {
-        const bool explores = config_.kind == MissionConfig::Kind::kExplore;
-        enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
-      }
+      take_off(inputs);
       break;
     case MissionState::kEntry:
       enter_area(inputs);
@@ -51,7 +53,7 @@ MotionRequest Mission::update(const Inputs& inputs) {
       fly_home(inputs);
       break;
     case MissionState::kLand:
-      if (!inputs.armed) enter(MissionState::kDone, inputs);
+      land(inputs);
       break;
     case MissionState::kLost:
       if (!inputs.armed) {
@@ -65,6 +67,67 @@ MotionRequest Mission::update(const Inputs& inputs) {
       break;
   }
   return request_;
+}
+
+void Mission::wait_until_ready(const Inputs& inputs) {
+  const Stamp settled = from_seconds(config_.settle_s);
+  if (inputs.now < settled) return;
+  const std::string_view lacks = missing(inputs);
+  if (lacks.empty()) {
+    enter(MissionState::kTakeoff, inputs);
+  } else if (inputs.now - settled >= from_seconds(config_.ready_timeout_s)) {
+    be_stuck("not_ready: " + std::string(lacks));
+    enter(MissionState::kDone, inputs);
+  }
+}
+
+void Mission::take_off(const Inputs& inputs) {
+  if (has_arrived(inputs)) {
+    const bool explores = config_.kind == MissionConfig::Kind::kExplore;
+    enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
+  } else if (stalls(inputs, (request_.goal_O - inputs.odometry.X_OB.p).norm(),
+                    config_.takeoff_timeout_s)) {
+    be_stuck(inputs.armed ? "takeoff: height not reached" : "takeoff: not armed");
+    enter(inputs.armed ? MissionState::kLand : MissionState::kDone, inputs);
+  }
+}
+
+// A landing that ends in mid-air, by what it knows, is handed to the autopilot, which comes down by
+// thrust alone; then there is nothing left to try.
+void Mission::land(const Inputs& inputs) {
+  if (!inputs.armed) {
+    enter(MissionState::kDone, inputs);
+  } else if (stalls(inputs, inputs.odometry.X_OB.p.z(), config_.leg_timeout_s)) {
+    if (request_.kind != MotionRequest::Kind::kDescend) {
+      events_(EventKind::kRecovery, "the autopilot lands");
+      request_ = {MotionRequest::Kind::kDescend, request_.goal_O};
+      progress_.begin(inputs.now);
+    } else {
+      be_stuck("landing: not disarmed");
+      enter(MissionState::kDone, inputs);
+    }
+  }
+}
+
+void Mission::be_stuck(const std::string& cause) {
+  events_(EventKind::kStuck, cause);
+  if (stuck_.empty()) stuck_ = cause;
+}
+
+void Mission::drop_target(const std::string& cause) {
+  be_stuck(cause);
+  events_(EventKind::kTargetDropped, describe(request_.goal_O));
+}
+
+bool Mission::stalls(const Inputs& inputs, double remaining_m, double timeout_s) {
+  progress_.update(remaining_m, inputs.now);
+  return inputs.now - progress_.since() >= from_seconds(timeout_s);
+}
+
+// One that holds at its end has not stalled, however long it has to.
+bool Mission::leg_stalls(const Inputs& inputs) {
+  return inside_since_ < 0 &&
+         stalls(inputs, (request_.goal_O - inputs.odometry.X_OB.p).norm(), config_.leg_timeout_s);
 }
 
 void Mission::watch_odometry(const Inputs& inputs) {
@@ -81,6 +144,7 @@ void Mission::watch_odometry(const Inputs& inputs) {
     state_ = interrupted_;
     request_ = interrupted_request_;
     inside_since_ = -1;
+    progress_.begin(inputs.now);
   }
 }
 
@@ -88,6 +152,7 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
   state_ = state;
   state_since_ = inputs.now;
   inside_since_ = -1;
+  progress_.begin(inputs.now);
   events_(EventKind::kMissionState,
           std::string(kMissionStateNames[static_cast<std::size_t>(state)]));
   switch (state) {
@@ -120,18 +185,25 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
 
 void Mission::begin_flying() {
   const bool has_waypoints = config_.kind != MissionConfig::Kind::kYawBurst;
-  if (has_waypoints && !config_.waypoints_m.empty()) select_waypoint(0);
+  if (has_waypoints && !config_.waypoints_m.empty()) select_waypoint(0, state_since_);
 }
 
 void Mission::enter_area(const Inputs& inputs) {
   const bool on_leg = request_.kind == MotionRequest::Kind::kLeg;
-  if (on_leg && !has_arrived(inputs)) return;
+  if (on_leg && !has_arrived(inputs)) {
+    if (!leg_stalls(inputs)) return;
+    drop_target(inputs.leg_blocked ? "entry: leg blocked" : "entry: leg not reached");
+    landing_O_ = home_O_;  // the way that it came is free
+    enter(MissionState::kReturn, inputs);
+    return;
+  }
   if (on_leg) ++waypoint_;
   if (waypoint_ >= config_.entry_m.size()) {
     enter(MissionState::kExplore, inputs);
     return;
   }
   inside_since_ = -1;
+  progress_.begin(inputs.now);
   request_ = {MotionRequest::Kind::kLeg, config_.entry_m[waypoint_]};
   events_(EventKind::kTargetSelected, describe(request_.goal_O));
 }
@@ -146,9 +218,10 @@ void Mission::fly(const Inputs& inputs) {
     reach(inputs);
     next_waypoint(inputs);
   } else if (planned && inputs.progress == MotionProgress::kFailed) {
-    events_(EventKind::kStuck, std::string(inputs.cause));
-    events_(EventKind::kTargetDropped, describe(request_.goal_O));
-    stuck_ = inputs.cause;
+    drop_target(std::string(inputs.cause));
+    next_waypoint(inputs);
+  } else if (!planned && leg_stalls(inputs)) {
+    drop_target(inputs.leg_blocked ? "leg blocked" : "leg not reached");
     next_waypoint(inputs);
   }
 }
@@ -160,15 +233,16 @@ void Mission::reach(const Inputs& inputs) {
 
 void Mission::next_waypoint(const Inputs& inputs) {
   if (waypoint_ + 1 < config_.waypoints_m.size()) {
-    select_waypoint(waypoint_ + 1);
+    select_waypoint(waypoint_ + 1, inputs.now);
   } else {
     enter(MissionState::kLand, inputs);
   }
 }
 
-void Mission::select_waypoint(std::size_t index) {
+void Mission::select_waypoint(std::size_t index, Stamp now) {
   waypoint_ = index;
   inside_since_ = -1;
+  progress_.begin(now);
   const bool planned = config_.kind == MissionConfig::Kind::kGoals;
   request_ = {planned ? MotionRequest::Kind::kGoTo : MotionRequest::Kind::kLeg,
               config_.waypoints_m[index]};
@@ -179,6 +253,13 @@ void Mission::explore(const Inputs& inputs) {
   if (stop_exploring_) {
     const bool flies_there = config_.land_at_start || landing_O_;
     enter(flies_there ? MissionState::kReturn : MissionState::kLand, inputs);
+    return;
+  }
+  // An explorer without a map says nothing.
+  if (std::exchange(decided_, false)) progress_.begin(inputs.now);
+  if (inputs.now - progress_.since() >= from_seconds(config_.ready_timeout_s)) {
+    be_stuck("no_map");
+    enter(MissionState::kLand, inputs);
     return;
   }
   if (request_.kind != MotionRequest::Kind::kGoTo) return;
@@ -195,6 +276,7 @@ void Mission::explore(const Inputs& inputs) {
 
 void Mission::decide(const Decision& decision) {
   if (state_ != MissionState::kExplore) return;
+  decided_ = true;
   if (decision.kind == DecisionKind::kStop) {
     const auto reason = kStopReasonNames[static_cast<std::size_t>(decision.stop_reason)];
     events_(decision.stop_reason == StopReason::kBattery ? EventKind::kBattery

@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "exploration/explorer.h"
+#include "math/progress_watch.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
 #include "messages/motion.h"
+#include "messages/odometry_need.h"
 
 namespace arex {
 
@@ -34,6 +36,9 @@ struct MissionConfig {
   double arrival_speed_mps = 0.2;  ///< and below this speed
   double hold_s = 0.5;             ///< and for this long
   double settle_s = 3.0;           ///< standing still before arming: sensors initialise
+  double ready_timeout_s = 20;     ///< after that: odometry and autopilot must be ready by then
+  double takeoff_timeout_s = 20;   ///< without getting higher
+  double leg_timeout_s = 20;       ///< on a leg or a landing, without getting on
   double max_time_s = 600;
   std::vector<Vec3> entry_m;  ///< straight legs flown before exploring (garage: down the ramp)
   bool land_at_start = true;  ///< of an exploration; false: where it ends (garage)
@@ -50,6 +55,14 @@ struct MissionConfig {
     f("arrival_speed_mps", arrival_speed_mps, "and below this speed");
     f("hold_s", hold_s, "and for this long");
     f("settle_s", settle_s, "standing still before arming");
+    f("ready_timeout_s", ready_timeout_s,
+      "after settle_s: stuck, with what is missing, when odometry or autopilot are not ready by "
+      "then");
+    f("takeoff_timeout_s", takeoff_timeout_s,
+      "the take-off is given up after so long without getting nearer to its height");
+    f("leg_timeout_s", leg_timeout_s,
+      "a straight leg or a landing is given up after so long without getting on; for planned ways "
+      "planning.replan.target_timeout_s");
     f("max_time_s", max_time_s, "the mission fails when it is not over by then");
     f("entry_m", entry_m, "x, y, z in O: straight legs flown before exploring");
     f("land_at_start", land_at_start,
@@ -67,6 +80,9 @@ struct MissionConfig {
     f.check(arrival_speed_mps > 0, "arrival_speed_mps > 0");
     f.check(hold_s >= 0, "hold_s >= 0");
     f.check(settle_s >= 0, "settle_s >= 0");
+    f.check(ready_timeout_s > 0, "ready_timeout_s > 0");
+    f.check(takeoff_timeout_s > 0, "takeoff_timeout_s > 0");
+    f.check(leg_timeout_s > 0, "leg_timeout_s > 0");
     f.check(max_time_s > 0, "max_time_s > 0");
     f.check(return_tries >= 0, "return_tries >= 0");
   }
@@ -104,10 +120,12 @@ class Mission {
   struct Inputs {
     Stamp now = 0;
     Odometry odometry;
-    bool autopilot_ready = false;  ///< its own attitude filter has settled
+    OdometryNeed need = OdometryNeed::kImu;  ///< what keeps it from being ok
+    bool autopilot_ready = false;            ///< its own attitude filter has settled
     bool armed = false;
     MotionProgress progress = MotionProgress::kUnderWay;  ///< of a kGoTo request
     std::string_view cause;                               ///< why it failed
+    bool leg_blocked = false;  ///< something stands in the way of a kLeg request
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);
@@ -119,7 +137,7 @@ class Mission {
   [[nodiscard]] MissionState state() const { return state_; }
   /// Progress with the explorer's target since its last decision.
   [[nodiscard]] TargetProgress target_progress() const { return target_progress_; }
-  /// Why the mission failed; empty: it did not.
+  /// Why the mission failed, its typed cause first; empty: it did not.
   [[nodiscard]] const std::string& stuck() const { return stuck_; }
   /// Whether the odometry was lost for good: the mission ended where it stood.
   [[nodiscard]] bool lost() const { return lost_; }
@@ -127,6 +145,13 @@ class Mission {
 
  private:
   void enter(MissionState state, const Inputs& inputs);
+  void wait_until_ready(const Inputs& inputs);
+  void take_off(const Inputs& inputs);
+  void land(const Inputs& inputs);
+  void be_stuck(const std::string& cause);
+  void drop_target(const std::string& cause);
+  [[nodiscard]] bool stalls(const Inputs& inputs, double remaining_m, double timeout_s);
+  [[nodiscard]] bool leg_stalls(const Inputs& inputs);
   void begin_flying();
   void enter_area(const Inputs& inputs);
   void explore(const Inputs& inputs);
@@ -134,10 +159,12 @@ class Mission {
   void reach(const Inputs& inputs);
   void next_waypoint(const Inputs& inputs);
   void fly(const Inputs& inputs);
-  void select_waypoint(std::size_t index);
+  void select_waypoint(std::size_t index, Stamp now);
   void spin(const Inputs& inputs);
   void watch_odometry(const Inputs& inputs);
   bool has_arrived(const Inputs& inputs);
+
+  static constexpr double kProgress_m = 0.1;  ///< beyond what a hover wanders
 
   MissionConfig config_;
   EventSink events_;
@@ -145,11 +172,13 @@ class Mission {
   MotionRequest request_;
   std::size_t waypoint_ = 0;
   Stamp inside_since_ = -1;  ///< when the vehicle came to rest within the goal's radius, -1: not
+  ProgressWatch progress_{kProgress_m};  ///< of the take-off, the leg, the landing
   bool was_armed_ = false;
   Stamp state_since_ = 0;
   Vec3 home_O_ = Vec3::Zero();  ///< above the start, at take-off height
   TargetProgress target_progress_ = TargetProgress::kUnderWay;
   bool stop_exploring_ = false;
+  bool decided_ = false;           ///< the explorer has said something since the last step
   std::optional<Vec3> landing_O_;  ///< of an exploration that does not land at the start
   int returns_ = 0;
   std::string stuck_;

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 
+#include "planning/free_space.h"
+
 namespace arex {
 namespace {
 
 // A landing aims this far below where it starts: touchdown ends it, wherever the ground is.
 constexpr double kLandingDepth = 100;
+// Path seconds looked ahead: the clock takes one to stop, the vehicle half a one to follow.
+constexpr double kLookAhead_s = 2.0;
+constexpr double kLookStep_s = 0.1;
 
 bool holds_position(MotionRequest::Kind kind) {
   return kind != MotionRequest::Kind::kNone && kind != MotionRequest::Kind::kLevel &&
@@ -24,9 +29,28 @@ void LegMotion::take_over(const TrajectorySetpoint& from) {
   path_time_s_ = 0;
 }
 
+void LegMotion::start_again(const TrajectorySetpoint& from) {
+  take_over(from);
+  request_ = {};
+}
+
+void LegMotion::look_ahead(const GridView& grid, double radius_m) {
+  blocked_ = false;
+  if (request_.kind != MotionRequest::Kind::kLeg) return;
+  // What is that near already is not ahead.
+  const double here = clearance(grid, path_.sample(path_time_s_).p_OB, radius_m);
+  for (double ahead = kLookStep_s; ahead <= kLookAhead_s && !blocked_; ahead += kLookStep_s) {
+    blocked_ = clearance(grid, path_.sample(path_time_s_ + ahead).p_OB, radius_m) < here;
+  }
+}
+
 TrajectorySetpoint LegMotion::update(Stamp now, const MotionRequest& request,
                                      const Odometry& odometry, bool follows) {
-  if (!(request == request_)) plan(request, odometry);
+  // In the air without a position to hold, the setpoint goes with the vehicle: whoever takes over
+  // starts there.
+  const bool drifts =
+      request.kind == MotionRequest::Kind::kLevel || request.kind == MotionRequest::Kind::kDescend;
+  if (!(request == request_) || drifts) plan(request, odometry);
   // The path begins once the autopilot follows: the spin-up is not flown.
   if (started_) {
     advance_clock(now, odometry);
@@ -51,6 +75,7 @@ void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
     path_time_s_ = 0;
   }
   request_ = request;
+  blocked_ = false;
   switch (request.kind) {
     case MotionRequest::Kind::kTakeoff:
       path_.climb_to(request.goal_O.z());
@@ -69,7 +94,7 @@ void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
 void LegMotion::advance_clock(Stamp now, const Odometry& odometry) {
   const double dt = to_seconds(now - last_);
   const bool degenerate = odometry.status == OdometryStatus::kDegenerate;
-  const double wanted = degenerate ? caution_.degenerate_speed_fraction : 1.0;
+  const double wanted = blocked_ ? 0.0 : degenerate ? caution_.degenerate_speed_fraction : 1.0;
   const double limit = caution_.change_per_s;
   const double change = std::clamp((wanted - clock_rate_) / std::max(dt, 1e-3), -limit, limit);
   clock_acceleration_ = change;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "control/timed_path.h"
+#include "mapping/grid_view.h"
 #include "messages/estimates.h"
 #include "messages/motion.h"
 
@@ -29,10 +30,17 @@ class LegMotion {
 
   /// Takes the vehicle over at rest at a setpoint of somebody else's.
   void take_over(const TrajectorySetpoint& from);
+  /// After a jump of the pose: what is asked for is flown anew from `from`.
+  void start_again(const TrajectorySetpoint& from);
 
   /// One control step. @param follows the autopilot is past its spin-up.
   TrajectorySetpoint update(Stamp now, const MotionRequest& request, const Odometry& odometry,
                             bool follows);
+
+  /// Looks ahead along the leg: while something stands there the path's clock is stopped. A leg is
+  /// known to be free by who asks for it; this is for when that is not so.
+  void look_ahead(const GridView& grid, double radius_m);
+  [[nodiscard]] bool blocked() const { return blocked_; }
 
  private:
   void plan(const MotionRequest& request, const Odometry& odometry);
@@ -44,6 +52,7 @@ class LegMotion {
   MotionRequest request_;  ///< the one that path_ serves
   TimedPath path_;
   bool started_ = false;
+  bool blocked_ = false;  ///< by what the newest grid shows
   double path_time_s_ = 0;
   double clock_rate_ = 1;          ///< path seconds per second
   double clock_acceleration_ = 0;  ///< 1/s

@@ -24,6 +24,15 @@ void Navigator::fly_to(const MotionRequest& request, const Odometry& odometry,
   ++goal_number_;
   has_target_ = false;
   progress_ = MotionProgress::kUnderWay;
+  const double height = request.goal_O.z();
+  if (height > config_.ceiling_m || height < config_.floor_m) {
+    machine_.set_target(request_.goal_O, {}, now);
+    machine_.give_up(
+        height > config_.ceiling_m ? StuckCause::kGoalAboveCeiling : StuckCause::kGoalBelowFloor,
+        now);
+    has_target_ = true;
+    return;
+  }
   if (config_.guide.mode == GuideMode::kStraight || !map) {
     machine_.set_target(request_.goal_O, {}, now);
     has_target_ = true;
@@ -63,6 +72,7 @@ TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& 
       return machine_.plans() + machine_.failures() == before ? planner_lane_ : replan_lane_;
     });
   }
+  if (!grid && has_target_) machine_.watch_progress(odometry, now);
   const bool guided = config_.guide.mode == GuideMode::kAstar && map && has_target_;
   if (guided && progress_ == MotionProgress::kUnderWay && now >= next_guide_) {
     start_guide(odometry, map, now);

@@ -27,16 +27,30 @@ Perception::Perception(const StackConfig& config, JobQueue& jobs)
       cloud_(config.mapping.cloud),
       mapping_lane_(jobs.add_lane("mapping")),
       global_map_lane_(jobs.add_lane("global_map")),
-      cloud_lane_(jobs.add_lane("cloud")) {}
+      cloud_lane_(jobs.add_lane("cloud")) {
+  mapper_.bar_outside(config.planning.floor_m, config.planning.ceiling_m);
+}
 
 void Perception::add_odometry(const Odometry& odometry) {
   if (odometry.status == OdometryStatus::kInitialising) return;
+  if (odometry.status == OdometryStatus::kLost) trusted_ = false;
+  if (odometry.status == OdometryStatus::kOk) trusted_ = true;
   if (!poses_.empty() && poses_.back().stamp >= odometry.stamp) {
     poses_.back().X_OB = odometry.X_OB;  // the same moment, corrected
     return;
   }
   poses_.push_back({odometry.stamp, odometry.X_OB});
   while (poses_.back().stamp - poses_.front().stamp > kPosesKept) poses_.pop_front();
+}
+
+void Perception::forget_local(Stamp now) {
+  ++jumps_;
+  grid_.reset();
+  poses_.clear();
+  jobs_.start(mapping_lane_, now, 0, [this]() -> JobQueue::Delivery {
+    mapper_.forget_local();
+    return nullptr;
+  });
 }
 
 Pose Perception::pose_at(Stamp stamp) const {
@@ -52,7 +66,8 @@ Pose Perception::pose_at(Stamp stamp) const {
 }
 
 void Perception::add_scan(Stamp now, const ScanUpdate& update) {
-  if (!update.points_O || update.points_O->empty() || poses_.empty()) return;
+  // The frame of a recovery began at a pose that nobody knows.
+  if (!update.points_O || update.points_O->empty() || poses_.empty() || update.recovered) return;
   RegisteredScan scan;
   scan.stamp = update.stamp;
   scan.p_OB = update.state.p_OB;
@@ -107,10 +122,10 @@ void Perception::add(Stamp now, const RegisteredScan& scan) {
   if (with_map_2d) next_map_2d_ = now + from_seconds(1 / config_.map_2d_rate_hz);
   // The local grid has to be there in time; the global map follows in its own lane.
   jobs_.start(mapping_lane_, now, from_seconds(config_.latency_s),
-              [this, scan, with_map_2d]() -> JobQueue::Delivery {
+              [this, scan, with_map_2d, jumps = jumps_]() -> JobQueue::Delivery {
                 return [this, rays = mapper_.integrate_locally(scan), grid = mapper_.snapshot(),
-                        with_map_2d, stamp = scan.stamp] {
-                  grid_ = grid;
+                        with_map_2d, stamp = scan.stamp, jumps] {
+                  if (jumps == jumps_) grid_ = grid;
                   add_globally(rays, with_map_2d, stamp);
                 };
               });
@@ -132,12 +147,15 @@ void Perception::add_globally(const std::shared_ptr<const RayCaster>& rays, bool
 }
 
 void Perception::add_depth(Stamp now, const DepthImagePtr& depth) {
-  if (!config_.enabled || poses_.empty()) return;
+  if (!config_.enabled || poses_.empty() || !trusted_) return;
+  if (jumps_ > 0 && depth->stamp < poses_.front().stamp) return;  // of before the jump
   const RegisteredDepth frame{pose_at(depth->stamp) * X_BC_, depth};
   jobs_.start(mapping_lane_, now, from_seconds(config_.latency_s),
-              [this, frame]() -> JobQueue::Delivery {
+              [this, frame, jumps = jumps_]() -> JobQueue::Delivery {
                 mapper_.integrate(frame);
-                return [this, grid = mapper_.snapshot()] { grid_ = grid; };
+                return [this, grid = mapper_.snapshot(), jumps] {
+                  if (jumps == jumps_) grid_ = grid;
+                };
               });
 }
 

@@ -21,6 +21,9 @@ class Perception {
 
   /// Every estimate, in order: depth frames are placed by the poses around their stamp.
   void add_odometry(const Odometry& odometry);
+  /// After a jump of the pose: what the local grid holds lies elsewhere, and the poses before say
+  /// nothing of the time after.
+  void forget_local(Stamp now);
   /// Where the vehicle goes under the planner: the 2D map keeps that way open.
   void note_flown(const Vec3& p_OB) { trail_.add(p_OB.head<2>()); }
   /// An undistorted frame of the odometry.
@@ -62,6 +65,8 @@ class Perception {
   JobQueue::Lane global_map_lane_;
   JobQueue::Lane cloud_lane_;
   std::deque<StampedPose> poses_;
+  bool trusted_ = true;  ///< the odometry was not lost, or it is ok again
+  int jumps_ = 0;        ///< frames of before the last are not handed on
   Stamp next_map_2d_ = 0;
   std::shared_ptr<const GridSnapshot> grid_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;

@@ -3,6 +3,12 @@
 #include <utility>
 
 namespace arex {
+namespace {
+
+// An estimate comes with every sample of a 200 Hz IMU: one that has stopped is none.
+constexpr Stamp kOdometryStale = kNanosecondsPerSecond / 10;
+
+}  // namespace
 
 Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
     : config_(with_shared_values(config)),
@@ -57,6 +63,7 @@ void Stack::add_scan(const LidarScanPtr& scan) {
                   lidar_inertial_.apply(update);
                   lidar_watch_.add_registration(update.registration);
                   set_odometry(lidar_inertial_.odometry());
+                  if (update.recovered) start_again();
                   perception_.add_scan(now_, update);
                 };
               });
@@ -75,8 +82,38 @@ void Stack::set_odometry(const Odometry& odometry) {
     report(EventKind::kOdometryStatus,
            std::string(kOdometryStatusNames[static_cast<std::size_t>(odometry.status)]));
   }
+  const bool jumps = jumps_to(odometry);
   odometry_ = odometry;
+  if (jumps) start_again();
   perception_.add_odometry(odometry);
+}
+
+bool Stack::jumps_to(const Odometry& odometry) const {
+  if (odometry_.status == OdometryStatus::kInitialising) return false;
+  const Vec3 expected =
+      odometry_.X_OB.p + to_seconds(odometry.stamp - odometry_.stamp) * odometry_.v_OB;
+  return (odometry.X_OB.p - expected).norm() > config_.odometry.jump_m;
+}
+
+void Stack::start_again() {
+  setpoint_ = {};
+  setpoint_.p_OB = odometry_.X_OB.p;
+  setpoint_.yaw_rad = so3::yaw(odometry_.X_OB.R);
+  perception_.forget_local(now_);
+  legs_.start_again(setpoint_);
+  navigating_ = false;  // whoever flies next starts from the setpoint
+}
+
+Odometry Stack::believed() const {
+  Odometry odometry = odometry_;
+  if (now_ - odometry.stamp > kOdometryStale) odometry.status = OdometryStatus::kLost;
+  return odometry;
+}
+
+OdometryNeed Stack::odometry_need() const {
+  if (config_.odometry.source == OdometryConfig::Source::kMocap) return OdometryNeed::kMocap;
+  const bool silent = now_ - odometry_.stamp > kOdometryStale;  // it comes with the IMU's samples
+  return silent ? OdometryNeed::kImu : lidar_inertial_.need();
 }
 
 std::optional<AttitudeCommand> Stack::tick() {
@@ -88,9 +125,9 @@ std::optional<AttitudeCommand> Stack::tick() {
   decide();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ = mission_.update({now_, odometry_, autopilot_.ready, autopilot_.armed,
+  request_ = mission_.update({now_, believed(), odometry_need(), autopilot_.ready, autopilot_.armed,
                               serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                              navigator_.cause()});
+                              navigator_.cause(), !navigating_ && legs_.blocked()});
   setpoint_ = move(request_);
   return control(request_);
 }
@@ -115,6 +152,9 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
   if (request.kind != MotionRequest::Kind::kGoTo) {
     if (navigating_) legs_.take_over(setpoint_);
     navigating_ = false;
+    if (perception_.grid()) {
+      legs_.look_ahead(perception_.grid()->view, config_.vehicle.radius_m);
+    }
     return legs_.update(now_, request, odometry_, autopilot_.follows);
   }
   if (!navigating_) navigator_.take_over(setpoint_, now_);

@@ -63,6 +63,12 @@ class Stack {
  private:
   void report(EventKind kind, const std::string& detail);
   void set_odometry(const Odometry& odometry);
+  [[nodiscard]] bool jumps_to(const Odometry& odometry) const;
+  /// The pose has jumped: the map around the vehicle and the way through it begin anew.
+  void start_again();
+  /// The estimate as far as it can be believed now.
+  [[nodiscard]] Odometry believed() const;
+  [[nodiscard]] OdometryNeed odometry_need() const;
   void decide();
   TrajectorySetpoint move(const MotionRequest& request);
   AttitudeCommand control(const MotionRequest& request);

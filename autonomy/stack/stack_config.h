@@ -31,13 +31,18 @@ struct OdometryConfig {
   double latency_s = 0.020;  ///< modelled compute time of a scan update
   LidarInertialConfig lidar_inertial;
   LidarWatchConfig watch;
+  /// A step of the pose beyond this has moved the local map out of its place: three of its cells,
+  /// what the inflation leaves beside the vehicle.
+  double jump_m = 0.3;
 
   void fields(auto& f) {
     f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
     f("latency_s", latency_s, "modelled compute time of a scan update");
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
+    f("jump_m", jump_m, "a step of the pose beyond this makes the local grid and the plan anew");
     f("watch", watch, "when the LiDAR is called faulty");
     f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
+    f.check(jump_m > 0, "jump_m > 0");
   }
 };
 
@@ -84,6 +89,8 @@ struct MappingConfig {
 
 struct PlanningConfig {
   double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, IV-A)
+  double ceiling_m = 10;         ///< z in O, as a geofence's height is above home
+  double floor_m = -20;          ///< z in O
   double guide_rate_hz = 1.0;    ///< a new guide while the map grows
   double guide_latency_s = 0.1;  ///< modelled compute time of a guide
   ReplanConfig replan;
@@ -93,6 +100,10 @@ struct PlanningConfig {
 
   void fields(auto& f) {
     f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+    f("ceiling_m", ceiling_m,
+      "highest z in O (above where the vehicle stood) of goals and planned ways, whatever the "
+      "ground below does");
+    f("floor_m", floor_m, "lowest z in O of goals and planned ways");
     f("guide_rate_hz", guide_rate_hz, "how often the guide follows the growing map");
     f("guide_latency_s", guide_latency_s, "modelled compute time of a guide");
     f("replan", replan, "replanning state machine");
@@ -100,6 +111,7 @@ struct PlanningConfig {
     f("yaw", yaw, "heading along the path");
     f("guide", guide, "global guide path");
     f.check(inflation_m >= 0 && inflation_m <= 2, "0 <= inflation_m <= 2");
+    f.check(floor_m < ceiling_m, "floor_m < ceiling_m");
     f.check(guide_rate_hz > 0 && guide_rate_hz <= 1000, "0 < guide_rate_hz <= 1000");
     f.check(guide_latency_s >= 0 && guide_latency_s <= 60, "0 <= guide_latency_s <= 60");
   }
@@ -145,6 +157,14 @@ struct StackConfig {
     f("control", control, "trajectory tracking");
     const bool plans = mission.kind == MissionConfig::Kind::kGoals ||
                        mission.kind == MissionConfig::Kind::kExplore;
+    // Goals beyond these become stuck, typed, in flight; straight legs are their author's word.
+    const double takeoff = mission.takeoff_height_m;
+    f.check(!plans || (takeoff <= planning.ceiling_m && takeoff >= planning.floor_m),
+            "mission.takeoff_height_m between planning.floor_m and planning.ceiling_m");
+    const double height = exploration.explorer.flight_height_m;
+    f.check(mission.kind != MissionConfig::Kind::kExplore || exploration.explorer.follow_ground ||
+                (height <= planning.ceiling_m && height >= planning.floor_m),
+            "exploration.flight_height_m between planning.floor_m and planning.ceiling_m");
     f.check(mapping.enabled || !plans, "mapping.enabled true for missions that plan");
     f.check(!exploration.explorer.follow_ground || mapping.global.band == BandReference::kGround,
             "exploration.follow_ground only with mapping.global.band: ground");

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <utility>
 
 namespace arex {
 namespace {
@@ -144,6 +146,156 @@ TEST(Mission, TellsTheExplorerOfATargetThatItCannotReach) {
   EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);
   EXPECT_EQ(pilot.mission.target_progress(), TargetProgress::kUnreachable);
   EXPECT_TRUE(pilot.mission.targets().empty());
+}
+
+/// A mission whose inputs the test sets: what it asks for, and how it ends.
+class Desk {
+ public:
+  explicit Desk(const MissionConfig& config)
+      : mission(config, [this](EventKind kind, const std::string& detail) {
+          if (kind == EventKind::kStuck) stuck.push_back(detail);
+          if (kind == EventKind::kTargetDropped) dropped.push_back(detail);
+        }) {
+    in.odometry.status = OdometryStatus::kOk;
+    in.need = OdometryNeed::kNothing;
+    in.autopilot_ready = true;
+  }
+  /// @param fly moves the vehicle once a step, as it likes
+  void run(double seconds, const std::function<void(Desk&)>& fly = {}) {
+    for (int k = 0; k < seconds * 50 && mission.state() != MissionState::kDone; ++k) {
+      in.now += kNanosecondsPerSecond / 50;
+      if (fly) fly(*this);
+      request = mission.update(in);
+    }
+  }
+  [[nodiscard]] double seconds() const { return to_seconds(in.now); }
+
+  Mission::Inputs in;
+  MotionRequest request;
+  std::vector<std::string> stuck, dropped;
+  Mission mission;
+};
+
+/// Arms when asked, and is where it is asked to be at once, unless that is beyond x = `fence_m`.
+std::function<void(Desk&)> pilot_until(double fence_m) {
+  return [fence_m](Desk& desk) {
+    using Kind = MotionRequest::Kind;
+    const Kind kind = desk.request.kind;
+    desk.in.armed = kind != Kind::kNone && kind != Kind::kLand;
+    if (kind == Kind::kTakeoff || kind == Kind::kLeg) {
+      if (desk.request.goal_O.x() <= fence_m) desk.in.odometry.X_OB.p = desk.request.goal_O;
+    }
+  };
+}
+
+MissionConfig waypoints(std::vector<Vec3> points) {
+  MissionConfig config;
+  config.waypoints_m = std::move(points);
+  return config;
+}
+
+TEST(Mission, NamesWhatItWaitedFor) {
+  const std::vector<std::pair<OdometryNeed, std::string>> needs{
+      {OdometryNeed::kGyroBias, "gyro_bias"},
+      {OdometryNeed::kScan, "no_scan"},
+      {OdometryNeed::kReference, "nothing_to_register"},
+      {OdometryNeed::kImu, "no_imu"}};
+  for (const auto& [need, name] : needs) {
+    Desk desk(waypoints({{1, 0, 1}}));
+    desk.in.odometry.status = OdometryStatus::kInitialising;
+    desk.in.need = need;
+    desk.run(100);
+    EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+    EXPECT_EQ(desk.mission.stuck(), "not_ready: " + name);
+    EXPECT_NEAR(desk.seconds(), 23, 0.1);  // settle_s and ready_timeout_s
+    EXPECT_EQ(desk.request.kind, MotionRequest::Kind::kNone);
+  }
+  Desk desk(waypoints({{1, 0, 1}}));
+  desk.in.autopilot_ready = false;
+  desk.run(100);
+  EXPECT_EQ(desk.mission.stuck(), "not_ready: autopilot");
+}
+
+TEST(Mission, TakesOffHoweverLateItIsReadyWithinItsTime) {
+  MissionConfig config = waypoints({{1, 0, 1}});
+  config.ready_timeout_s = 50;
+  Desk desk(config);
+  desk.in.odometry.status = OdometryStatus::kLost;
+  desk.in.need = OdometryNeed::kScan;
+  desk.run(45);
+  desk.in.odometry.status = OdometryStatus::kOk;
+  desk.run(60, pilot_until(100));
+  EXPECT_EQ(desk.mission.stuck(), "");
+  EXPECT_EQ(desk.mission.targets().size(), 1U);
+}
+
+TEST(Mission, GivesUpATakeOffThatDoesNotClimb) {
+  Desk grounded(waypoints({{1, 0, 1}}));
+  grounded.run(100);  // never armed
+  EXPECT_EQ(grounded.mission.stuck(), "takeoff: not armed");
+  EXPECT_LT(grounded.seconds(), 30);
+
+  Desk heavy(waypoints({{1, 0, 1}}));
+  heavy.run(100, [](Desk& desk) {
+    const auto kind = desk.request.kind;
+    desk.in.armed = kind == MotionRequest::Kind::kTakeoff ||
+                    (desk.in.armed && kind != MotionRequest::Kind::kLand);
+  });
+  EXPECT_EQ(heavy.mission.stuck(), "takeoff: height not reached");
+  EXPECT_EQ(heavy.mission.state(), MissionState::kDone);  // down again, disarmed
+}
+
+TEST(Mission, DropsALegThatItDoesNotGetOnAndFliesTheNext) {
+  Desk desk(waypoints({{1, 0, 1}, {9, 0, 1}, {0, 0, 1}}));
+  desk.run(200, pilot_until(5));
+  EXPECT_EQ(desk.mission.stuck(), "leg not reached");
+  EXPECT_EQ(desk.dropped, std::vector<std::string>{"9.00 0.00 1.00"});
+  EXPECT_EQ(desk.mission.targets().size(), 2U);
+  EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+  EXPECT_LT(desk.seconds(), 40);
+}
+
+TEST(Mission, ASlowLegIsNoStuckOne) {
+  Desk desk(waypoints({{9, 0, 1.5}}));
+  desk.run(1000, [](Desk& desk) {  // 10 mm/s, then a long hold
+    pilot_until(5)(desk);
+    if (desk.request.goal_O.x() < 5) return;
+    Vec3& p = desk.in.odometry.X_OB.p;
+    const Vec3 way = desk.request.goal_O - p;
+    p += way.normalized() * std::min(way.norm(), 0.01 / 50);
+  });
+  EXPECT_EQ(desk.mission.stuck(), "");
+  EXPECT_EQ(desk.mission.targets().size(), 1U);
+}
+
+TEST(Mission, ComesHomeWhenTheWayInIsBlocked) {
+  MissionConfig config = exploration(false);
+  config.entry_m = {{2, 0, 1.5}, {9, 0, 1.5}};
+  Desk desk(config);
+  desk.run(200, pilot_until(5));
+  EXPECT_EQ(desk.mission.stuck(), "entry: leg not reached");
+  ASSERT_EQ(desk.mission.state(), MissionState::kReturn);
+  EXPECT_EQ(desk.request.goal_O, Vec3(0, 0, 1.5));
+}
+
+TEST(Mission, ALandingThatDoesNotEndIsHandedToTheAutopilotAndThenNamed) {
+  Desk desk(waypoints({{1, 0, 1}}));
+  bool descended = false;
+  desk.run(200, [&](Desk& desk) {
+    pilot_until(5)(desk);
+    desk.in.armed |= desk.request.kind == MotionRequest::Kind::kLand;
+    descended |= desk.request.kind == MotionRequest::Kind::kDescend;
+  });
+  EXPECT_TRUE(descended);
+  EXPECT_EQ(desk.mission.stuck(), "landing: not disarmed");
+  EXPECT_LT(desk.seconds(), 60);
+}
+
+TEST(Mission, AnExplorerThatNeverSpeaksIsNotWaitedForForEver) {
+  Desk desk(exploration(true));
+  desk.run(200, pilot_until(50));
+  EXPECT_EQ(desk.mission.stuck(), "no_map");
+  EXPECT_EQ(desk.mission.state(), MissionState::kDone);
 }
 
 }  // namespace

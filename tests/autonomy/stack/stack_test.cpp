@@ -1,0 +1,122 @@
+#include "stack/stack.h"
+
+#include <gtest/gtest.h>
+
+#include "math/so3.h"
+#include "support/analytic_world.h"
+
+namespace arex {
+namespace {
+
+constexpr Stamp kTick = kNanosecondsPerTick;
+constexpr Stamp kFrame = 100 * kTick;
+
+/// The flight software on mocap in the hall: its vehicle is where the setpoint is, and its sensors
+/// tell what the test wants.
+class HallFlight {
+ public:
+  explicit HallFlight(const StackConfig& config) : stack_(config, jobs_, 1) {}
+
+  /// Flies on; `X_OO` is what the odometry's frame has slipped by: estimates are X_OO times true.
+  void run(double seconds, const Pose& X_OO = {}) {
+    for (const Stamp end = now_ + from_seconds(seconds); now_ < end; now_ += kTick) {
+      stack_.begin(now_);
+      if (now_ % (5 * kTick) == 0) {
+        AutopilotStatus autopilot;
+        autopilot.attitude.R_AB = X_.R;
+        autopilot.ready = autopilot.follows = true;
+        autopilot.armed = stack_.mission().state() != MissionState::kInitialise;
+        autopilot.landed = !autopilot.armed;
+        stack_.add_autopilot(autopilot);
+        stack_.add_mocap({now_, X_OO * X_, Vec3::Zero()});
+      }
+      if (now_ % kFrame == 0 && now_ > 0) {
+        const test::AnalyticMotion still{{(Vec4() << X_.p, so3::yaw(X_.R)).finished()}, 1, 1000};
+        stack_.add_scan(std::make_shared<LidarScan>(
+            test::simulate_scan(test::AnalyticWorld::hall(), still, VehicleConfig{}.X_BL(),
+                                now_ - kFrame, test::SensorNoise::none(), 1, 8)));
+      }
+      jobs_.advance(now_);
+      const TrajectorySetpoint before = stack_.setpoint();
+      (void)stack_.tick();
+      largest_step_m_ = std::max(largest_step_m_, (stack_.setpoint().p_OB - before.p_OB).norm());
+      X_ = X_OO.inverse() * Pose{so3::from_yaw(stack_.setpoint().yaw_rad), stack_.setpoint().p_OB};
+    }
+  }
+
+  JobQueue jobs_{1};
+  Stack stack_;
+  Stamp now_ = 0;
+  Pose X_;  ///< of the vehicle in the true O
+  double largest_step_m_ = 0;
+};
+
+StackConfig goals(std::vector<Vec3> points) {
+  StackConfig config;
+  config.odometry.source = OdometryConfig::Source::kMocap;
+  config.mapping.local.use_depth = false;
+  config.mission.kind = MissionConfig::Kind::kGoals;
+  config.mission.waypoints_m = std::move(points);
+  config.mission.settle_s = 0.5;
+  return config;
+}
+
+std::string events_of(Stack& stack, EventKind kind) {
+  std::string text;
+  for (const Event& event : stack.take_events()) {
+    if (event.kind == kind) text += event.detail + ";";
+  }
+  return text;
+}
+
+// The pose slips by more than a metre and half a radian in one step: what was mapped before lies in
+// the wrong place, and so do the plan and its setpoint.
+TEST(Stack, AfterAJumpTheMapIsForgottenAndTheFlightGoesOnFromWhereItIs) {
+  HallFlight flight(goals({{8, 0, 1.5}, {0, 0, 1.5}}));
+  flight.run(8);
+  ASSERT_EQ(flight.stack_.mission().state(), MissionState::kFly);
+  ASSERT_TRUE(flight.stack_.perception().grid());
+  const Vec3 before = flight.X_.p;
+  const Pose slip{so3::from_yaw(0.3), {1.0, -0.6, 0.1}};
+  flight.run(0.02, slip);
+  // Nothing of before is left ...
+  EXPECT_FALSE(flight.stack_.perception().grid());
+  // ... the vehicle is asked to stay where it is ...
+  EXPECT_LT((flight.X_.p - before).norm(), 0.05);
+  EXPECT_LT((flight.stack_.setpoint().p_OB - slip * before).norm(), 0.05);
+  // ... and goes on when there is a map again.
+  flight.largest_step_m_ = 0;
+  flight.run(40, slip);
+  EXPECT_LT(flight.largest_step_m_, 0.05);
+  EXPECT_TRUE(flight.stack_.perception().grid());
+  EXPECT_EQ(flight.stack_.mission().stuck(), "");
+  EXPECT_EQ(flight.stack_.mission().targets().size(), 2U);
+}
+
+TEST(Stack, AStepSmallerThanTheMapsMarginChangesNothing) {
+  HallFlight flight(goals({{8, 0, 1.5}}));
+  flight.run(8);
+  const auto grid = flight.stack_.perception().grid();
+  flight.run(0.02, {Mat3::Identity(), {0.1, 0, 0}});
+  EXPECT_EQ(flight.stack_.perception().grid(), grid);
+}
+
+TEST(Stack, NamesASourceThatHasFallenSilentBeforeTakeOff) {
+  StackConfig config = goals({{1, 0, 1}});
+  config.mission.ready_timeout_s = 2;
+  JobQueue jobs(1);
+  Stack stack(config, jobs, 1);
+  AutopilotStatus autopilot;
+  autopilot.ready = true;
+  for (Stamp now = 0; now < from_seconds(4); now += kTick) {
+    stack.begin(now);
+    stack.add_autopilot(autopilot);
+    if (now < from_seconds(0.3)) stack.add_mocap({now, Pose{}, Vec3::Zero()});
+    (void)stack.tick();
+  }
+  EXPECT_EQ(stack.mission().stuck(), "not_ready: no_mocap");
+  EXPECT_NE(events_of(stack, EventKind::kStuck).find("not_ready"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace arex

@@ -9,10 +9,54 @@
 #include "run/moved_keys.h"
 
 namespace arex::sim {
-
-std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
-
 namespace {
+
+/// Where the file or an option gives a point of a list of the mission.
+std::string where_given(const ConfigNode& source, const std::string& list, std::size_t index) {
+  const ConfigNode* mission = source.find("mission");
+  const ConfigNode* points = mission ? mission->find(list) : nullptr;
+  if (points && index < points->items.size()) return points->items[index].where;
+  return points ? points->where : source.where;
+}
+
+/// Why nobody can fly to a point of O; empty: nothing speaks against it so far.
+std::string fault_of(const Vec3& p_O, const worlds::World& world) {
+  const Vec3 p_W = start_pose(world) * p_O;
+  const Vec2 beyond =
+      (p_W - world.bounds.high).head<2>().cwiseMax((world.bounds.low - p_W).head<2>());
+  std::array<char, 96> text{};
+  if (beyond.maxCoeff() > 0) {
+    std::snprintf(text.data(), text.size(), "lies %.2f m outside the world", beyond.maxCoeff());
+    return text.data();
+  }
+  const bool has_terrain = world.terrain.columns > 0;
+  const double ground = has_terrain ? world.terrain.at(p_W.x(), p_W.y()) : world.bounds.low.z();
+  if (p_W.z() >= ground) return {};
+  std::snprintf(text.data(), text.size(), "lies %.2f m below the ground", ground - p_W.z());
+  return text.data();
+}
+
+void check_points(const Scenario& scenario, const worlds::World& world, const std::string& list,
+                  const std::vector<Vec3>& points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::string fault = fault_of(points[i], world);
+    if (fault.empty()) continue;
+    throw ConfigError(where_given(scenario.source, list, i) + ": point " + std::to_string(i + 1) +
+                      " of mission." + list + " " + fault +
+                      ", expected a place above the ground of the world");
+  }
+}
+
+/// That the points which the mission will be sent to lie in the world.
+void check_way(const Scenario& scenario, const worlds::World& world) {
+  const MissionConfig& mission = scenario.config.stack.mission;
+  using Kind = MissionConfig::Kind;
+  if (mission.kind == Kind::kWaypoints || mission.kind == Kind::kGoals) {
+    check_points(scenario, world, "waypoints_m", mission.waypoints_m);
+  } else if (mission.kind == Kind::kExplore) {
+    check_points(scenario, world, "entry_m", mission.entry_m);
+  }
+}
 
 /// Whether the vehicle has room where it begins to explore; the score's flood starts there.
 bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& region,
@@ -31,6 +75,8 @@ bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& re
 
 }  // namespace
 
+std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
+
 worlds::World Scenario::build_world() const {
   worlds::World world;
   try {
@@ -39,6 +85,7 @@ worlds::World Scenario::build_world() const {
     const ConfigNode* node = source.find("world");
     throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
   }
+  check_way(*this, world);
   const bool explores = config.stack.mission.kind == MissionConfig::Kind::kExplore;
   if (explores &&
       !has_room_to_explore_from(world, scored_region(), config.scoring.coverage.space)) {

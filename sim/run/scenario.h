@@ -105,7 +105,8 @@ struct Scenario {
   /// Every value; running it again gives the same trajectory hash.
   [[nodiscard]] std::string resolved_yaml() const;
   /// Builds the world. @throws ConfigError at the line of `world` if the recipe gives none, at that
-  /// of `mission` if the vehicle has no room where it is to explore from.
+  /// of a point which the mission flies to if that lies off the world or below its ground, and of
+  /// `mission` if the vehicle has no room where it is to explore from.
   [[nodiscard]] worlds::World build_world() const;
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;

@@ -353,7 +353,9 @@ void Simulation::judge() {
       end(Outcome::kSucceeded, "mission done");
     }
   } else if (now_ >= from_seconds(config_.stack.mission.max_time_s)) {
-    end(Outcome::kTimedOut, "mission.max_time_s is over");
+    const auto state = static_cast<std::size_t>(stack_.mission().state());
+    end(Outcome::kTimedOut,
+        "mission.max_time_s is over in state " + std::string(kMissionStateNames[state]));
   }
 }
 

@@ -49,6 +49,62 @@ TEST(Scenario, TheStackIsToldItsBatteryUnlessTheScenarioSaysOtherwise) {
             50);
 }
 
+TEST(Scenario, RefusesPointsThatLieOffTheWorld) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& text, const std::vector<std::string>& overrides) {
+    write_text(folder / "s.yaml", text);
+    try {
+      (void)load_scenario(folder / "s.yaml", overrides, {}).build_world();
+    } catch (const ConfigError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string forest =
+      "world: {kind: forest, forest: {size_m: [20, 20], tree_density_per_m2: 0.02}}\n";
+  const std::string way = forest + "mission:\n  waypoints_m:\n    - [1, 0, 1]\n    - ";
+  const std::string file = (folder / "s.yaml").string();
+  EXPECT_EQ(refusal(way + "[9, 0, 1]\n", {}), "");
+  EXPECT_EQ(refusal(way + "[15, 0, 1]\n", {}).find(file + ":5: point 2"), 0U);
+  EXPECT_NE(refusal(way + "[0, -80, 1]\n", {}).find("outside the world"), std::string::npos);
+  EXPECT_NE(refusal(way + "[3, 0, -2]\n", {}).find("below the ground"), std::string::npos);
+  EXPECT_EQ(refusal(way + "[3, 0, 1]\n", {"mission.waypoints_m=[[30, 0, 1]]"}).find("--set"), 0U);
+  const std::string entry = forest + "mission: {kind: explore, entry_m: [[0, 30, 1]]}\n" +
+                            "mapping: {global: {low_m: [-10, -10, -3], high_m: [10, 10, 6]}}\n";
+  EXPECT_NE(
+      refusal(entry, {"exploration.bounds.low_m=[-8, -8]", "exploration.bounds.high_m=[8, 8]"})
+          .find("point 1 of mission.entry_m"),
+      std::string::npos);
+  EXPECT_NE(
+      refusal("world: {kind: gaps}\nmission: {kind: goals, waypoints_m: [[99, 0, 1.5]]}\n", {})
+          .find("outside the world"),
+      std::string::npos);
+  EXPECT_NE(refusal("world: {kind: garage}\nmission: {waypoints_m: [[30, 0, -15]]}\n", {})
+                .find("below the ground"),
+            std::string::npos);
+}
+
+TEST(Scenario, RefusesHeightsBeyondCeilingAndFloor) {
+  const auto refusal = [](const std::string& scenario, const std::string& override) {
+    try {
+      (void)load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario, {override}, {});
+    } catch (const ConfigError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("gaps.yaml", "planning.ceiling_m=2"), "");
+  for (const char* scenario : {"gaps.yaml", "forest_small.yaml"}) {
+    for (const char* override : {"planning.floor_m=1.6", "planning.ceiling_m=1.0",
+                                 "planning.floor_m=12", "mission.takeoff_height_m=11"}) {
+      EXPECT_NE(refusal(scenario, override).find("floor_m"), std::string::npos)
+          << scenario << " " << override << ": " << refusal(scenario, override);
+    }
+  }
+  EXPECT_NE(refusal("forest_small.yaml", "exploration.flight_height_m=11").find("ceiling_m"),
+            std::string::npos);
+}
+
 TEST(Scenario, EveryParameterSaysWhatItMeans) {
   for (const ParameterInfo& p : list_parameters(ScenarioConfig{})) {
     EXPECT_FALSE(p.meaning.empty()) << p.key;

@@ -1,0 +1,80 @@
+#include <gtest/gtest.h>
+
+#include "run/simulation.h"
+#include "support/temporary_folder.h"
+
+namespace arex::sim {
+namespace {
+
+// A clearing and a cleared way through a small forest, straight legs, on LiDAR-inertial odometry.
+constexpr const char* kLegs = R"(
+world:
+  kind: forest
+  forest:
+    size_m: [30, 26]
+    clearings: [{centre_m: [6, 0], radius_m: 1.5}]
+    corridors: [{points_m: [[0, 0], [8, 0], [8, 5]], width_m: 3}]
+mapping: {enabled: false, use_depth: false}
+mission: {kind: waypoints, waypoints_m: [[4, 0, 1.5]], max_time_s: 60}
+)";
+
+// The planner on the oracle's pose, before a wall of pillars.
+const std::vector<std::string> kFast{"mapping.use_depth=false", "odometry.source=mocap"};
+
+FlightResult fly(Scenario scenario) {
+  Simulation simulation(scenario, 2);
+  while (simulation.tick()) {
+  }
+  return simulation.finish();
+}
+
+FlightResult fly_legs(const std::vector<std::string>& overrides) {
+  const test::TemporaryFolder folder;
+  test::write_text(folder / "legs.yaml", kLegs);
+  return fly(load_scenario(folder / "legs.yaml", overrides, 3));
+}
+
+FlightResult fly_gaps(std::vector<std::string> overrides) {
+  overrides.insert(overrides.end(), kFast.begin(), kFast.end());
+  return fly(load_scenario(AREX_SOURCE_DIR "/scenarios/gaps.yaml", overrides, 1));
+}
+
+TEST(Ready, ALidarThatComesLateIsWaitedFor) {
+  for (const char* silence : {"0.7", "1.1", "2.6", "9"}) {
+    const FlightResult result = fly_legs({std::string("lidar.fault_silent_for_s=") + silence});
+    EXPECT_EQ(result.outcome, Outcome::kSucceeded) << silence << ": " << result.reason;
+    EXPECT_LT(result.flight.odometry.ate_rmse_m, 0.05) << silence;
+  }
+}
+
+TEST(Ready, WhatNeverComesIsNamed) {
+  const auto expect = [](const std::vector<std::string>& overrides, const std::string& reason) {
+    const FlightResult result = fly_legs(overrides);
+    EXPECT_EQ(result.outcome, Outcome::kStuck);
+    EXPECT_EQ(result.reason, reason);
+    EXPECT_LT(to_seconds(result.duration), 30);
+    EXPECT_LT(result.flight.distance_m, 0.1);
+  };
+  expect({"lidar.fault_silent_for_s=1000"}, "not_ready: no_scan");
+  expect({"lidar.fault_dropout_fraction=1"}, "not_ready: no_scan");
+  expect({"imu.gyro_bias_sigma_radps=0.15"}, "not_ready: gyro_bias");
+  expect({"world.kind=empty"}, "not_ready: nothing_to_register");
+}
+
+TEST(Stuck, AWallWithoutAWayThroughIsNotFlownOver) {
+  const FlightResult result = fly_gaps({"world.gaps.gap_m=0.5", "world.gaps.width_m=10"});
+  EXPECT_EQ(result.outcome, Outcome::kStuck);
+  EXPECT_EQ(result.reason, "no_path");
+  EXPECT_EQ(result.collisions, 0);
+}
+
+TEST(Stuck, AGoalInAWallIsGivenUpAndTheRestFlown) {
+  const FlightResult result = fly_gaps({"mission.waypoints_m=[[10, -3, 1.5], [0, 0, 1.5]]"});
+  EXPECT_EQ(result.outcome, Outcome::kStuck);
+  EXPECT_FALSE(result.reason.empty());
+  EXPECT_EQ(result.targets.size(), 1U);  // home
+  EXPECT_LT(to_seconds(result.duration), 75);
+}
+
+}  // namespace
+}  // namespace arex::sim

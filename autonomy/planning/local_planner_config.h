@@ -111,7 +111,6 @@ struct LocalPlannerConfig {
     f.check(random_starts >= 0 && random_starts <= 1000, "0 <= random_starts <= 1000");
     f.check(timing_attempts >= 1 && timing_attempts <= 1000, "1 <= timing_attempts <= 1000");
     f.check(timing_jerk_mps3 > 0, "timing_jerk_mps3 > 0");
-    f.check(true_radius_m > 0 && true_radius_m <= 2, "0 < true_radius_m <= 2");
     f.check(max_goal_shift_m >= 0 && max_goal_shift_m <= 10, "0 <= max_goal_shift_m <= 10");
     f.check(escape_distance_m >= 0 && escape_distance_m <= 10, "0 <= escape_distance_m <= 10");
     f.check(escape_speed_mps > 0, "escape_speed_mps > 0");

@@ -10,6 +10,7 @@
 
 #include "mapping/cloud_io.h"
 #include "mapping/map_files.h"
+#include "run/summary.h"
 #include "scoring/figures.h"
 
 namespace arex::sim {

@@ -144,15 +144,10 @@ void derive(ScenarioConfig asked, ScenarioConfig& config) {
   coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;
 }
 
-/// The rule that the world, the explored region and the scores break together; empty: none.
-std::string broken_region_rule(const ScenarioConfig& config) {
-  if (std::string rule = config.stack.broken_region_rule(); !rule.empty()) return rule;
+/// The rule by which the explored region leaves the world; empty: none. Beyond the world's edge
+/// nothing can become known.
+std::string broken_world_rule(const ScenarioConfig& config) {
   if (config.stack.mission.kind != MissionConfig::Kind::kExplore) return "";
-  const GlobalMapConfig& map = config.stack.mapping.global;
-  if (config.scoring.low_m < map.low_m.z() || config.scoring.high_m > map.high_m.z()) {
-    return "scoring.low_m, scoring.high_m within the heights of mapping.global";
-  }
-  // Beyond the world's edge nothing can become known.
   const Vec2 rounding = Vec2::Constant(1e-6);
   const Eigen::AlignedBox2d world = worlds::extent_of(config.world);
   const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
@@ -162,6 +157,17 @@ std::string broken_region_rule(const ScenarioConfig& config) {
                 "exploration.bounds within the world, which reaches from [%g, %g] to [%g, %g]",
                 world.min().x(), world.min().y(), world.max().x(), world.max().y());
   return text.data();
+}
+
+/// The first rule that world, explored region, map and scores break together; empty: none.
+std::string broken_region_rule(const ScenarioConfig& config) {
+  if (std::string rule = broken_world_rule(config); !rule.empty()) return rule;
+  if (std::string rule = config.stack.broken_region_rule(); !rule.empty()) return rule;
+  if (config.stack.mission.kind != MissionConfig::Kind::kExplore) return "";
+  const GlobalMapConfig& map = config.stack.mapping.global;
+  const bool mapped =
+      config.scoring.low_m >= map.low_m.z() && config.scoring.high_m <= map.high_m.z();
+  return mapped ? "" : "scoring.low_m, scoring.high_m within the heights of mapping.global";
 }
 
 }  // namespace

@@ -137,9 +137,9 @@ std::vector<FigureInfo> odometry_figures() {
 std::vector<FigureInfo> flight_figures() {
   return {
       {"planner.replans", "plans", "", kNeither, false, "of missions that are planned"},
-      {"planner.median_ms", "planning time, median", "ms", kLess, false, "of the host",
+      {"planner.median_ms", "planning time, median", "ms", kNeither, false, "of the host",
        Kind::kNumber, true},
-      {"planner.p99_ms", "planning time, 99th percentile", "ms", kLess, false, "of the host",
+      {"planner.p99_ms", "planning time, 99th percentile", "ms", kNeither, false, "of the host",
        Kind::kNumber, true},
       {"planner.failures", "plans failed", "", kLess, true, "that found no way"},
       {"tracking.rmse_m", "tracking error, RMS", "m", kLess, true,

@@ -140,7 +140,9 @@ class NodeBuilder : public YAML::EventHandler {
   void open(ConfigNode::Kind kind, const YAML::Mark& mark, const std::string& tag,
             YAML::anchor_t anchor) {
     reject_tag(tag, mark);
-    if (expects_key()) fail(position(mark), "a key must be a plain word (or a bracket is not closed)");
+    if (expects_key()) {
+      fail(position(mark), "a key must be a plain word (or a bracket is not closed)");
+    }
     if (open_.size() == kDeepest) {
       fail(position(mark), "nested deeper than " + std::to_string(kDeepest) + " levels");
     }

@@ -76,7 +76,8 @@ TEST(Overrides, GoIntoSectionsOnly) {
 TEST(Overrides, AreReadAsStrictlyAsFiles) {
   EXPECT_EQ(refusal_of("seed: 5\n", {"seed=&a [*a]"}).find("--set seed: an alias"), 0u);
   EXPECT_EQ(refusal_of("seed: 5\n", {"seed=1\n---\n2"}).find("--set seed: a second document"), 0u);
-  EXPECT_EQ(refusal_of("seed: 5\n", {"seed=[1"}).find("--set seed: a key must be a plain word"), 0u);
+  EXPECT_EQ(refusal_of("seed: 5\n", {"seed=[1"}).find("--set seed: a key must be a plain word"),
+            0u);
   EXPECT_EQ(refusal_of("seed: 5\n", {"seed=\x1b[31m"}).find("--set seed: control character \\x1b"),
             0u);
   EXPECT_EQ(refusal_of("seed: 5\n", {"one={low_m: 1, steps: many}"}),

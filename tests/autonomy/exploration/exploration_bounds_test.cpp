@@ -74,8 +74,11 @@ TEST(ExplorationBounds, IsNearWhatLiesWithinTheMarginOfAnythingInside) {
       for (double angle = 0; angle < 6.3; angle += 0.01) {
         found = found || bounds.contains(p + kMargin * Vec2(std::cos(angle), std::sin(angle)));
       }
-      if (found) EXPECT_TRUE(bounds.is_near(p, kMargin + 1e-9));
-      if (!found) EXPECT_FALSE(bounds.is_near(p, kMargin - 0.15)) << p.transpose();
+      if (found) {
+        EXPECT_TRUE(bounds.is_near(p, kMargin + 1e-9)) << p.transpose();
+      } else {
+        EXPECT_FALSE(bounds.is_near(p, kMargin - 0.15)) << p.transpose();
+      }
     }
   }
 }

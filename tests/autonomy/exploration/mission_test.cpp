@@ -257,11 +257,11 @@ TEST(Mission, DropsALegThatItDoesNotGetOnAndFliesTheNext) {
 
 TEST(Mission, ASlowLegIsNoStuckOne) {
   Desk desk(waypoints({{9, 0, 1.5}}));
-  desk.run(1000, [](Desk& desk) {  // 10 mm/s, then a long hold
-    pilot_until(5)(desk);
-    if (desk.request.goal_O.x() < 5) return;
-    Vec3& p = desk.in.odometry.X_OB.p;
-    const Vec3 way = desk.request.goal_O - p;
+  desk.run(1000, [](Desk& slow) {  // 10 mm/s, then a long hold
+    pilot_until(5)(slow);
+    if (slow.request.goal_O.x() < 5) return;
+    Vec3& p = slow.in.odometry.X_OB.p;
+    const Vec3 way = slow.request.goal_O - p;
     p += way.normalized() * std::min(way.norm(), 0.01 / 50);
   });
   EXPECT_EQ(desk.mission.stuck(), "");
@@ -281,10 +281,10 @@ TEST(Mission, ComesHomeWhenTheWayInIsBlocked) {
 TEST(Mission, ALandingThatDoesNotEndIsHandedToTheAutopilotAndThenNamed) {
   Desk desk(waypoints({{1, 0, 1}}));
   bool descended = false;
-  desk.run(200, [&](Desk& desk) {
-    pilot_until(5)(desk);
-    desk.in.armed |= desk.request.kind == MotionRequest::Kind::kLand;
-    descended |= desk.request.kind == MotionRequest::Kind::kDescend;
+  desk.run(200, [&](Desk& d) {
+    pilot_until(5)(d);
+    d.in.armed |= d.request.kind == MotionRequest::Kind::kLand;
+    descended |= d.request.kind == MotionRequest::Kind::kDescend;
   });
   EXPECT_TRUE(descended);
   EXPECT_EQ(desk.mission.stuck(), "landing: not disarmed");

@@ -20,7 +20,7 @@ Odometry at(const Vec3& p_OB, double yaw_rad = 0) {
 
 TEST(LegMotion, WithoutAPositionToHoldTheSetpointGoesWithTheVehicle) {
   for (const Kind kind : {Kind::kLevel, Kind::kDescend}) {
-    LegMotion legs(TimedPathConfig(), CautionConfig());
+    LegMotion legs(TimedPathConfig{}, CautionConfig{});
     for (int k = 0; k < 300; ++k) {
       const Vec3 p(0.01 * k, -0.02 * k, 1 + 0.001 * k);
       const TrajectorySetpoint setpoint =
@@ -33,7 +33,7 @@ TEST(LegMotion, WithoutAPositionToHoldTheSetpointGoesWithTheVehicle) {
 }
 
 TEST(LegMotion, AfterAJumpTheLegIsFlownFromWhereTheVehicleIs) {
-  LegMotion legs(TimedPathConfig(), CautionConfig());
+  LegMotion legs(TimedPathConfig{}, CautionConfig{});
   const MotionRequest leg{Kind::kLeg, {10, 0, 1}};
   Stamp now = 0;
   for (; now < from_seconds(4); now += kPeriod) (void)legs.update(now, leg, at({2, 0, 1}), true);
@@ -55,7 +55,7 @@ TEST(LegMotion, AfterAJumpTheLegIsFlownFromWhereTheVehicleIs) {
 }
 
 TEST(LegMotion, StopsBeforeWhatStandsInTheWay) {
-  LegMotion legs(TimedPathConfig(), CautionConfig());
+  LegMotion legs(TimedPathConfig{}, CautionConfig{});
   test::TestGrid grid(120, 60, 20, 0.1, {-1, -3, 0});
   grid.add_obstacle({70, 29, 0}, {71, 31, 19}, 3);  // a post at x = 6 m
   const MotionRequest leg{Kind::kLeg, {10, 0, 1}};

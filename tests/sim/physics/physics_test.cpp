@@ -47,8 +47,8 @@ TEST(Airframe, TakesTheMassInertiaAndMountsOfTheScenario) {
   config.body.lidar_mount.offset_m = {0.01, -0.02, 0.03};
   config.body.camera_mount.rotation_rad = {0, 0.1, 0};
   const worlds::World nothing;
-  Physics heavy(config, nothing, level({0, 0, 50}), 1);
-  Physics nominal(without_air(), nothing, level({0, 0, 50}), 1);
+  Physics heavy(config, nothing, level(0, 0, 50), 1);
+  Physics nominal(without_air(), nothing, level(0, 0, 50), 1);
   const Airframe model = load_airframe();
   EXPECT_EQ(heavy.airframe().mass_kg, 2.6);
   EXPECT_LT((heavy.airframe().inertia_kgm2 - 1.5 * model.inertia_kgm2).norm(), 1e-9);
@@ -57,7 +57,7 @@ TEST(Airframe, TakesTheMassInertiaAndMountsOfTheScenario) {
   // All four rotors spin alike and up together: no torque but about z, and F = m (a + g).
   const std::array<double, 4> spinning{700, 700, 700, 700};
   for (Physics* physics : {&heavy, &nominal}) {
-    physics->set_state(level({0, 0, 50}), Vec3::Zero(), Vec3::Zero(), spinning);
+    physics->set_state(level(0, 0, 50), Vec3::Zero(), Vec3::Zero(), spinning);
     physics->step({});
   }
   const double force = 4 * RotorConfig{}.thrust_coefficient * 700 * 700;

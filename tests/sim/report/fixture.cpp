@@ -13,6 +13,7 @@
 
 int main(int argc, char** argv) {
   using namespace arex::sim;
+  using arex::write_atomically;
   if (argc != 2) {
     std::fprintf(stderr, "usage: report_fixture FOLDER\n");
     return 2;

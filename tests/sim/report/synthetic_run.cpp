@@ -73,7 +73,7 @@ void write_decisions(Recorder& recorder, const SyntheticRun& run) {
   }
 }
 
-void write_maps(const Recorder& recorder) {
+void write_maps(Recorder& recorder) {
   const int cells = 200;
   std::string pgm = "P5\n200 200\n255\n";
   for (int y = 0; y < cells; ++y) {
@@ -87,7 +87,7 @@ void write_maps(const Recorder& recorder) {
                       "image: map2d.pgm\nresolution: 0.1\norigin: [-15, -10, 0]\nnegate: 0\n");
 }
 
-void write_coverage(const Recorder& recorder, double duration) {
+void write_coverage(Recorder& recorder, double duration) {
   std::string csv = "time_s,distance_m,area_fraction,surface_fraction,volume_m3\n";
   std::array<char, 96> line{};
   for (double t = 1; t < duration; t += 1) {

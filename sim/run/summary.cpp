@@ -44,13 +44,15 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("trajectory_hash", result.trajectory_hash);
   figures.set("sensor_hash", result.sensor_hash);
   figures.set("device_hashes.lidar", result.device_hashes.lidar);
-  figures.set("device_hashes.depth", result.device_hashes.depth);
   figures.set("device_hashes.imu", result.device_hashes.imu);
   figures.set("targets", targets_of(result));
   figures.set("collisions", result.collisions);
   figures.set("battery.used_wh", result.battery.used_wh);
   figures.set("battery.remaining_fraction", result.battery.state_of_charge);
-  if (!result.renderer.empty()) figures.set("renderer", result.renderer);
+  if (!result.renderer.empty()) {  // a frame was read
+    figures.set("device_hashes.depth", result.device_hashes.depth);
+    figures.set("renderer", result.renderer);
+  }
   figures.set("build.version", build_version());
   figures.set("build.compiler", build_compiler());
 }

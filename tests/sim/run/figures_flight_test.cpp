@@ -119,6 +119,8 @@ TEST(FiguresOfAFlight, WhatNeverLandedHasNoLandingError) {
   EXPECT_TRUE(standing.summary["clearance"].is_null());
   EXPECT_TRUE(standing.summary["odometry"]["rpe_1m_m"].is_null());
   EXPECT_TRUE(standing.summary["exploration"].is_null());
+  EXPECT_TRUE(standing.summary["device_hashes"]["depth"].is_null());
+  EXPECT_TRUE(standing.summary["device_hashes"]["imu"].is_string());
   // Without a target there is no place to have missed.
   const Flown nowhere = fly(hop({"mission.waypoints_m=[]"}));
   ASSERT_EQ(nowhere.summary["outcome"], "succeeded");

@@ -90,7 +90,7 @@ TEST(FiguresOfAFlight, TheTrackingErrorStopsWhereItBeginsToLand) {
       EXPECT_TRUE(std::isnan(tracking[i])) << time[i];
     }
     const bool en_route = time[i] > fly_at + 0.05 && time[i] < land_at - 0.05;
-    if (en_route) EXPECT_GT(clearance[i], 0) << time[i];
+    EXPECT_TRUE(!en_route || clearance[i] > 0) << time[i];
     if (time[i] < fly_at - 0.05 || time[i] > land_at + 0.05) {
       EXPECT_TRUE(std::isnan(clearance[i])) << time[i];
     }
@@ -174,7 +174,7 @@ TEST(HelpFigures, NamesEveryFieldAndEveryColumn) {
   for (std::string word; help >> word;) words.insert(word);
   const auto summary = ordered_json::parse(read_text(folder / "run/summary.json"));
   for (const auto& [key, text] : flatten(summary)) {
-    if (!text.empty()) EXPECT_TRUE(words.contains(key)) << key;
+    EXPECT_TRUE(text.empty() || words.contains(key)) << key;
   }
   std::size_t files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder / "run")) {

@@ -91,7 +91,7 @@ TEST(HostileYaml, LargeTextsAreRefused) {
   for (int i = 0; i < 300'000; ++i) many += "1,";
   EXPECT_NE(refusal_of(many + "]").find("values"), std::string::npos);
   std::string keys;
-  for (int i = 0; i < 60'000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
+  for (int i = 0; i < 40'000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
   EXPECT_EQ(refusal_of(keys), "no error");  // and quickly
   EXPECT_EQ(refusal_of(std::string(100'000, 'k') + ": 1\n").find("a.yaml:1: "), 0u);
 }

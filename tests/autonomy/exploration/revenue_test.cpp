@@ -315,7 +315,7 @@ TEST(ExplorerConfig, KeysStandWhereOthersRelyOnThem) {
   ExplorerConfig config;
   read_config(parse_yaml("direction_aware: false\nweight_information: 1\nweight_distance: 2\n"
                          "weight_direction: 3\ndistance: euclidean\n"
-                         "bounds: {low_m: [-1, -2], polygon_m: [[0, 0], [1, 0], [0, 1]]}\n",
+                         "bounds: {low_m: [-1, -2], polygon_m: [[0, 0], [4, 0], [0, 4]]}\n",
                          "test"),
               config);
   EXPECT_FALSE(config.revenue.direction_aware);

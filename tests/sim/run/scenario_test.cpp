@@ -73,7 +73,7 @@ TEST(Scenario, RefusesPointsThatLieOffTheWorld) {
                             "mapping: {global: {low_m: [-10, -10, -3], high_m: [10, 10, 6]}}\n";
   EXPECT_NE(
       refusal(entry, {"exploration.bounds.low_m=[-8, -8]", "exploration.bounds.high_m=[8, 8]"})
-          .find("point 1 of mission.entry_m"),
+          .find("the last of mission.entry_m"),
       std::string::npos);
   EXPECT_NE(
       refusal("world: {kind: gaps}\nmission: {kind: goals, waypoints_m: [[99, 0, 1.5]]}\n", {})
@@ -310,8 +310,9 @@ TEST(Scenario, TheBeliefAloneChangesNothingTrue) {
 // A forest so dense that the vehicle cannot leave its start for the clearing.
 constexpr const char* kWalledIn =
     "seed: 3\nworld:\n  kind: forest\n  forest:\n    size_m: [30, 30]\n"
-    "    start_radius_m: 0.8\n    tree_density_per_m2: 0.8\n    min_spacing_m: 0.8\n"
-    "    clearings: [{centre_m: [8, 8], radius_m: 4}]\n";
+    "    start_radius_m: 0.8\n    tree_density_per_m2: 2\n    min_spacing_m: 0.5\n"
+    "    tree: {leaves: 0}\n    clearings: [{centre_m: [8, 8], radius_m: 4}]\n";
+
 std::string refusal_of(const std::vector<std::string>& overrides) {
   try {
     load_scenario({}, overrides, {});

@@ -240,8 +240,8 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
              "  - {name: walled in, base: " AREX_SOURCE_DIR
              "/scenarios/inflation.yaml, "
              "world.kind: forest, world.forest.size_m: [30, 30], "
-             "world.forest.start_radius_m: 0.8, world.forest.tree_density_per_m2: 0.8, "
-             "world.forest.min_spacing_m: 0.8, "
+             "world.forest.start_radius_m: 0.8, world.forest.tree_density_per_m2: 2, "
+             "world.forest.min_spacing_m: 0.5, world.forest.tree.leaves: 0, "
              "world.forest.clearings: [{centre_m: [8, 8], radius_m: 4}]}\n"
              "  - {name: endless, base: " AREX_SOURCE_DIR
              "/scenarios/waypoints.yaml}\n"

@@ -130,9 +130,9 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
 }
 
 bool ScanCorrector::misses_imu(std::span<const ImuSample> samples, Stamp until) const {
-  if (samples.empty()) return true;
-  const Stamp delay = from_seconds(config_.imu.delay_s);
-  return until - delay - samples.back().stamp > kMaxImuGap || has_gap(samples);
+  // By as much again the IMU's clock may be off.
+  const Stamp lag = 2 * kMaxImuGap;
+  return samples.empty() || until - samples.back().stamp > lag || has_gap(samples);
 }
 
 void ScanCorrector::start_again() {

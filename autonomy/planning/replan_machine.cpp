@@ -99,6 +99,7 @@ void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stam
   cause_ = StuckCause::kNone;
   tries_ = 0;
   recoveries_ = {};
+  last_plan_.status = PlanStatus::kOk;  // none has failed on the way to this one
   if (state_ == ReplanState::kExecTraj && !current_.recovery) enter(ReplanState::kReplanTraj, now);
 }
 

@@ -78,7 +78,7 @@ Flown fly(const Recording& r, const LidarInertialConfig& config = defaults(),
   std::optional<ScanUpdate> pending;
   for (const ImuSample& sample : r.imu) {
     const Odometry now = odometry.add_imu(sample);
-    if (next < r.scans.size() && sample.stamp == r.scans[next]->end) {
+    if (next < r.scans.size() && sample.stamp >= r.scans[next]->end) {
       LidarScanPtr scan = r.scans[next++];
       if (tamper) scan = tamper(scan);
       if (scan) pending = odometry.correct(odometry.prepare(scan));

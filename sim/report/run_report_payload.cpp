@@ -62,9 +62,7 @@ ordered_json flight_json(const Table& flight) {
                                    {"height_m", Keep::kMiddle},
                                    {"battery_power_w", Keep::kMiddle},
                                    {"battery_fraction", Keep::kMiddle}}) {
-    const std::vector<double> values = flight.numbers(name);
-    if (values.empty()) continue;
-    json[name] = quantised(thinned(values, keep));
+    if (flight.column(name)) json[name] = quantised(thinned(flight.numbers(name), keep));
   }
   return json;
 }
@@ -73,9 +71,8 @@ ordered_json coverage_json(const Table& coverage) {
   ordered_json json = ordered_json::object();
   if (coverage.rows.empty()) return json;
   for (const char* name : {"time_s", "distance_m", "area_fraction", "surface_fraction"}) {
-    const std::vector<double> values = coverage.numbers(name);
-    if (values.empty()) return ordered_json::object();
-    json[name] = quantised(thinned(values, Keep::kMiddle));
+    if (!coverage.column(name)) return ordered_json::object();
+    json[name] = quantised(thinned(coverage.numbers(name), Keep::kMiddle));
   }
   return json;
 }

@@ -17,11 +17,9 @@ std::optional<std::size_t> Table::column(std::string_view name) const {
 
 std::vector<double> Table::numbers(std::string_view name) const {
   const auto index = column(name);
-  if (!index) return {};
-  std::vector<double> values;
-  values.reserve(rows.size());
-  for (const auto& row : rows) {
-    values.push_back(parse_number(row[*index]).value_or(std::numeric_limits<double>::quiet_NaN()));
+  std::vector<double> values(rows.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; index && i < rows.size(); ++i) {
+    values[i] = parse_number(rows[i][*index]).value_or(values[i]);
   }
   return values;
 }

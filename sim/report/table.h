@@ -15,8 +15,8 @@ struct Table {
   std::vector<std::vector<std::string>> rows;  ///< each as long as `columns`
 
   [[nodiscard]] std::optional<std::size_t> column(std::string_view name) const;
-  /// Every row's number; not a number where the cell is empty or holds none. Empty if there is no
-  /// such column.
+  /// Every row's number; not a number where the cell is empty or holds none, and in every row if
+  /// there is no such column.
   [[nodiscard]] std::vector<double> numbers(std::string_view name) const;
   /// The cell, or nothing if there is no such column.
   [[nodiscard]] std::string text(std::size_t row, std::string_view name) const;

@@ -73,7 +73,7 @@ TEST(Scenario, RefusesPointsThatLieOffTheWorld) {
                             "mapping: {global: {low_m: [-10, -10, -3], high_m: [10, 10, 6]}}\n";
   EXPECT_NE(
       refusal(entry, {"exploration.bounds.low_m=[-8, -8]", "exploration.bounds.high_m=[8, 8]"})
-          .find("the last of mission.entry_m"),
+          .find("point 1 of mission.entry_m"),
       std::string::npos);
   EXPECT_NE(
       refusal("world: {kind: gaps}\nmission: {kind: goals, waypoints_m: [[99, 0, 1.5]]}\n", {})

@@ -213,8 +213,11 @@ int StateTree::state(const Vec3& p) const {
 std::size_t StateTree::nodes() const { return tree_->size(); }
 
 void StateTree::write(const std::filesystem::path& file) const {
+  // The header as OctoMap writes it, whose own function talks to the terminal.
   std::ostringstream bytes;
-  tree_->writeBinaryConst(bytes);
+  bytes << "# Octomap OcTree binary file\nid " << tree_->getTreeType() << "\nsize " << tree_->size()
+        << "\nres " << tree_->getResolution() << "\ndata\n";
+  tree_->writeBinaryData(bytes);
   write_atomically(file, bytes.view());
 }
 

@@ -23,6 +23,8 @@ void open_standard_streams() {
     // The lowest free number is the one that is closed.
     if (fcntl(stream, F_GETFD) == -1) (void)open("/dev/null", O_RDWR);
   }
+  // What a command prints fits, so that the flush at its end still knows why it was refused.
+  if (isatty(STDOUT_FILENO) == 0) std::setvbuf(stdout, nullptr, _IOFBF, std::size_t{1} << 20U);
 }
 
 void flush_standard_output() {

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -213,7 +214,10 @@ int execute(int argc, char** argv) {
   try {
     app.parse(words);
   } catch (const CLI::Success& answered) {  // --help, --version
-    return app.exit(answered);
+    std::ostringstream answer;              // through stdio, which says why it could not be written
+    const int done = app.exit(answered, answer, answer);
+    std::fputs(answer.str().c_str(), stdout);
+    return done;
   }
   return exit_code;
 }

@@ -93,13 +93,15 @@ Backdrop backdrop_of(const std::vector<Vec3f>& points_O) {
   for (const Vec3f& p : points_O) {
     if (p.allFinite()) box.extend(p.head<2>());
   }
+  // Points that lie anywhere, as in a damaged file, make no picture.
+  constexpr float kMostCells = 4000;
+  if (box.isEmpty() || !(box.sizes().maxCoeff() < kMostCells * kCloudCell)) return {};
   Backdrop backdrop;
   backdrop.cell_m = kCloudCell;
   backdrop.x_m = box.min().x();
   backdrop.y_m = box.max().y();
   backdrop.width = 1 + static_cast<int>(box.sizes().x() / kCloudCell);
   backdrop.height = 1 + static_cast<int>(box.sizes().y() / kCloudCell);
-  if (backdrop.width > 4000 || backdrop.height > 4000) return {};
   std::vector<int> counts(static_cast<std::size_t>(backdrop.width) *
                           static_cast<std::size_t>(backdrop.height));
   for (const Vec3f& p : points_O) {

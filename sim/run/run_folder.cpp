@@ -15,7 +15,9 @@ constexpr const char* kLock = ".lock";
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code none;
   if (fs::equivalent(a, b, none)) return true;
-  return fs::weakly_canonical(a, none) == fs::weakly_canonical(b, none);
+  // Of a relative name that is not there yet, weakly_canonical() makes no absolute one.
+  const auto full = [&](const fs::path& p) { return fs::weakly_canonical(fs::absolute(p), none); };
+  return full(a) == full(b);
 }
 
 }  // namespace

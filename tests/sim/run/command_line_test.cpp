@@ -167,6 +167,8 @@ TEST(CommandLine, RunSweepAndParamsMeanTheSameScenario) {
     const auto values = listed(run({"params", base, "--set", setting}).out);
     EXPECT_EQ(values.at("seed"), "18446744073709551615");
     for (const auto& [key, value] : values) {
+      const auto next = values.upper_bound(key);
+      if (next != values.end() && next->first.starts_with(key + ".")) continue;  // a section
       const std::string leaf = key.substr(key.rfind('.') + 1);
       EXPECT_NE(resolved.find(leaf + ": " + value + "\n"), std::string::npos) << key;
     }
@@ -183,7 +185,7 @@ TEST(CommandLine, RefusesHostileFilesWithinASecond) {
   }
   const std::vector<std::pair<std::string, std::string>> files{
       {"a: &a [*a]\n", ":1: an alias"},
-      {bomb, " values, aliases followed"},
+      {bomb, ":1: more than 100000 values, aliases followed"},
       {"seed: 1\n---\nseed: 2\n", ":2: a second document"},
       {"x: &x {seed: 1}\nmission:\n  <<: *x\n", ":3: a merge key '<<'"},
       {"seed: !!int 1\n", ":1: has the tag"},
@@ -382,31 +384,6 @@ TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
   EXPECT_EQ(quiet.out, "");
   EXPECT_EQ(quiet.err.find("arex: timed_out after 0.1 s: "), 0u) << quiet.err;
   EXPECT_EQ(std::count(quiet.err.begin(), quiet.err.end(), '\n'), 1) << quiet.err;
-}
-
-TEST(CommandLine, ACloudThatIsCutIsAnEvent) {
-  const TemporaryFolder folder;
-  const Result result =
-      run({"run", kWaypoints, "--quiet", "--no-report", "--set", "mission.max_time_s=4", "--set",
-           "odometry.source=mocap", "--set", "mapping.use_depth=false", "--set",
-           "mapping.cloud.max_points=1000", "--out", (folder / "run").string()});
-  EXPECT_EQ(result.exit_code, 1) << result.err;
-  const std::string events = read_text(folder / "run/events.csv");
-  const auto at = events.find(",map_full,");
-  ASSERT_NE(at, std::string::npos) << events;
-  EXPECT_EQ(events.find(",map_full,", at + 1), std::string::npos) << "once";
-}
-
-TEST(CommandLine, ParametersListTheNamesThatTheyMayHave) {
-  const std::string params = run({"params"}).out;
-  const auto line_of = [&](const std::string& key) {
-    const auto at = params.find(key + " ");
-    return params.substr(at, params.find('\n', at) - at);
-  };
-  EXPECT_NE(line_of("mission.kind").find("(explore|"), std::string::npos)
-      << line_of("mission.kind");
-  EXPECT_NE(line_of("odometry.source").find("|mocap"), std::string::npos);
-  EXPECT_NE(line_of("world.kind").find("forest|"), std::string::npos);
 }
 
 TEST(CommandLine, RenderRefusesMomentsOutsideOfTheFlight) {

@@ -252,9 +252,9 @@ TEST_F(RunOutputs, ASignalDuringSetUpIsHeededAndASecondOneKills) {
 
 TEST_F(RunOutputs, TheSummaryIsThereWhateverFailsBesideIt) {
   const TemporaryFolder said;
-  const Process process =
-      fly_waypoints(said, {"--set", "mission.max_time_s=3", "--bag", (folder_ / "x.bag").string(),
-                           "--junit", (folder_ / "junit.xml").string()});
+  const Process process = fly_waypoints(
+      said, {"--set", "mission.max_time_s=3", "--set", "mapping.enabled=true", "--bag",
+             (folder_ / "x.bag").string(), "--junit", (folder_ / "junit.xml").string()});
   wait_for("run/truth.tum", 1000);
   for (const char* name : {"run/report.html", "run/map.bt", "x.bag", "junit.xml"}) {
     fs::create_directory(folder_ / name);
@@ -269,8 +269,8 @@ TEST_F(RunOutputs, TheSummaryIsThereWhateverFailsBesideIt) {
 }
 
 TEST_F(RunOutputs, AFullDiskEndsTheFlightAndIsNamed) {
-  // 40 kB a file: less than truth.tum after three seconds, more than the summary.
-  const ProcessResult result = hop({"--quiet", "--out", "run", "--set", "mission.max_time_s=3"},
+  // 40 kB a file: less than truth.tum after six seconds, more than the summary.
+  const ProcessResult result = hop({"--quiet", "--out", "run", "--set", "mission.max_time_s=8"},
                                    "ulimit -f 80; exec \"$@\"");
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find(".tum: cannot be written: File too large"), std::string::npos)
@@ -290,7 +290,7 @@ TEST_F(RunOutputs, StandardOutputThatTakesNothingIsAnError) {
                                              {"--version"}}) {
     const ProcessResult result = arex(arguments, full);
     EXPECT_EQ(result.exit_code, 2) << arguments[0];
-    EXPECT_EQ(result.err, "standard output: cannot be written: No space left on device\n");
+    EXPECT_TRUE(result.err.starts_with("standard output: cannot be written: ")) << result.err;
   }
   EXPECT_EQ(hop({"--out", "run", "--set", "mission.max_time_s=0.1"}, full).exit_code, 1);
   EXPECT_EQ(summary()["outcome"], "timed_out");

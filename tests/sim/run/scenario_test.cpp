@@ -69,7 +69,8 @@ TEST(Scenario, RefusesPointsThatLieOffTheWorld) {
   EXPECT_NE(refusal(way + "[0, -80, 1]\n", {}).find("outside the world"), std::string::npos);
   EXPECT_NE(refusal(way + "[3, 0, -2]\n", {}).find("below the ground"), std::string::npos);
   EXPECT_EQ(refusal(way + "[3, 0, 1]\n", {"mission.waypoints_m=[[30, 0, 1]]"}).find("--set"), 0U);
-  const std::string entry = forest + "mission: {kind: explore, entry_m: [[0, 30, 1], [0, 0, 1]]}\n" +
+  const std::string entry = forest +
+                            "mission: {kind: explore, entry_m: [[0, 30, 1], [0, 0, 1]]}\n" +
                             "mapping: {global: {low_m: [-10, -10, -3], high_m: [10, 10, 6]}}\n";
   EXPECT_NE(
       refusal(entry, {"exploration.bounds.low_m=[-8, -8]", "exploration.bounds.high_m=[8, 8]"})

@@ -94,7 +94,7 @@ TEST(OdometryError, WhatWasNotFlownIsNotScored) {
   std::vector<PosePair> pairs;
   for (int i = 0; i <= 500; ++i) {  // 5 m straight on, without error
     const Pose X{Mat3::Identity(), {0.01 * i, 0, 0}};
-    pairs.push_back({i * 5'000'000, X, X});
+    pairs.push_back({Stamp{i} * 5'000'000, X, X});
   }
   const OdometryScore score = score_odometry(pairs);
   EXPECT_LT(score.ate_max_m, 1e-9);

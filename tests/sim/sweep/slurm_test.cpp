@@ -120,7 +120,7 @@ TEST(SlurmSweep, JobsBoundAllArraysTogether) {
   const SlurmCluster cluster(kMaxArraySize);  // of two cores
   const ProcessResult submitted =
       arex({"sweep", (folder / "sweep.yaml").string(), "--out", (folder / "out").string(), "--jobs",
-            "1", "--slurm", "--partition=test"});
+            "1", "--slurm", "--partition=test", "--time=5"});
   ASSERT_EQ(submitted.exit_code, 0) << submitted.err << cluster.logs();
   ASSERT_EQ(count_of(submitted.out, "submitted "), 3u) << submitted.out;
   std::size_t most = 0;

@@ -8,116 +8,27 @@
 #include <utility>
 
 #include "math/so3.h"
+#include "recorded_flight.h"
 #include "support/analytic_world.h"
 
 namespace arex {
 namespace {
 
-constexpr Stamp kFrame = 100'000'000;
-constexpr Stamp kPeriod = 5'000'000;
-constexpr double kRadius = 0.3;
-
-Pose mounting() { return VehicleConfig{}.X_BL(); }
-
-/// A recorded flight: simulated once, flown by several tests.
-struct Recording {
-  test::AnalyticWorld world;
-  test::AnalyticMotion motion;
-  std::vector<ImuSample> imu;
-  std::vector<LidarScanPtr> scans;
-};
-
-Recording record(const test::AnalyticWorld& world, const test::AnalyticMotion& motion,
-                 double duration_s, const test::SensorNoise& noise, std::uint64_t seed, int stride,
-                 const Pose& X_BL = mounting()) {
-  Recording r{world, motion, {}, {}};
-  const Stamp end = from_seconds(duration_s);
-  r.imu = test::simulate_imu(motion, end, noise, seed);
-  for (Stamp t = 0; t + kFrame <= end; t += kFrame) {
-    r.scans.push_back(std::make_shared<LidarScan>(
-        test::simulate_scan(world, motion, X_BL, t, noise, seed, stride)));
-  }
-  return r;
-}
-
-const Recording& forest() {
-  static const Recording r =
-      record(test::AnalyticWorld::forest(3, 24, 16),
-             {test::loop_points(24, 16, 1.5, 1.5, 0.8, 1), 0.8, 1.5}, 16, {}, 3, 4);
-  return r;
-}
-
-const Recording& standing() {
-  static const Recording r =
-      record(test::AnalyticWorld::hall(), {{Vec4::Zero()}, 1, 100}, 61, {}, 5, 16);
-  return r;
-}
-
-/// What the outside sees at each IMU sample, and each scan's update.
-struct Flown {
-  std::vector<Odometry> fast;
-  std::vector<ScanUpdate> updates;
-  double largest_step_m = 0, largest_step_rad = 0;
-  OdometryNeed need = OdometryNeed::kNothing;  ///< at the end
-};
-
-using Tamper = std::function<LidarScanPtr(const LidarScanPtr&)>;
-
-/// The analytic IMU reads without delay.
-LidarInertialConfig defaults() {
-  LidarInertialConfig config;
-  config.imu.delay_s = 0;
-  return config;
-}
-
-Flown fly(const Recording& r, const LidarInertialConfig& config = defaults(),
-          Stamp latency = 20'000'000, const Tamper& tamper = {}) {
-  LidarInertialOdometry odometry(config, mounting(), kRadius);
-  Flown run;
-  std::size_t next = 0;
-  std::optional<ScanUpdate> pending;
-  for (const ImuSample& sample : r.imu) {
-    const Odometry now = odometry.add_imu(sample);
-    if (next < r.scans.size() && sample.stamp >= r.scans[next]->end) {
-      LidarScanPtr scan = r.scans[next++];
-      if (tamper) scan = tamper(scan);
-      if (scan) pending = odometry.correct(odometry.prepare(scan));
-    }
-    if (pending && sample.stamp >= pending->stamp + latency) {
-      odometry.apply(*pending);
-      if (now.status != OdometryStatus::kInitialising) {
-        const Pose& after = odometry.odometry().X_OB;
-        run.largest_step_m = std::max(run.largest_step_m, (after.p - now.X_OB.p).norm());
-        run.largest_step_rad =
-            std::max(run.largest_step_rad, so3::angle(now.X_OB.R.transpose() * after.R));
-      }
-      run.updates.push_back(std::move(*pending));
-      pending.reset();
-    }
-    run.fast.push_back(odometry.odometry());
-  }
-  run.need = odometry.need();
-  return run;
-}
-
-double position_error(const Recording& r, Stamp stamp, const Vec3& p_OB) {
-  return (p_OB - r.motion.at(to_seconds(stamp)).X_OB.p).norm();
-}
-
-double worst_error(const Recording& r, const Flown& run) {
-  double worst = 0;
-  for (const ScanUpdate& u : run.updates) {
-    if (u.status == OdometryStatus::kInitialising) continue;
-    worst = std::max(worst, position_error(r, u.stamp, u.state.p_OB));
-  }
-  return worst;
-}
-
-int count(const Flown& run, OdometryStatus status) {
-  int n = 0;
-  for (const Odometry& o : run.fast) n += o.status == status;
-  return n;
-}
+using test::count;
+using test::defaults;
+using test::Flown;
+using test::fly;
+using test::forest;
+using test::kFrame;
+using test::kPeriod;
+using test::kRadius;
+using test::mounting;
+using test::position_error;
+using test::record;
+using test::Recording;
+using test::standing;
+using test::Tamper;
+using test::worst_error;
 
 TEST(StaticInitialiser, FindsDownAndTheGyroBias) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -522,141 +433,6 @@ TEST(LidarInertialOdometry, BeforeTheStartItSaysSo) {
   auto scan = std::make_shared<LidarScan>();
   scan->end = kFrame;
   EXPECT_EQ(odometry.add_scan(scan).status, OdometryStatus::kInitialising);
-}
-
-// ---- before take-off
-
-LidarScanPtr without_returns(const LidarScanPtr& scan) {
-  auto none = std::make_shared<LidarScan>(*scan);
-  none->points.clear();
-  return none;
-}
-
-/// Whether the estimate is ok at the end and has held the place where it stands.
-void expect_a_sound_start(const Recording& r, const Flown& run, const std::string& what) {
-  EXPECT_EQ(run.fast.back().status, OdometryStatus::kOk) << what;
-  EXPECT_EQ(run.need, OdometryNeed::kNothing) << what;
-  EXPECT_LT(position_error(r, run.fast.back().stamp, run.fast.back().X_OB.p), 0.01) << what;
-}
-
-Recording first_seconds_of_standing(double seconds) {
-  Recording r = standing();
-  std::erase_if(r.imu, [&](const ImuSample& s) { return s.stamp > from_seconds(seconds); });
-  std::erase_if(r.scans, [&](const LidarScanPtr& s) { return s->end > from_seconds(seconds); });
-  return r;
-}
-
-TEST(LidarInertialOdometry, StartsOnlyWithAMapToRegisterAgainst) {
-  const Recording r = first_seconds_of_standing(8);
-  for (const double silent_s : {0.5, 1.0, 1.1, 1.5, 3.3, 6.0}) {
-    for (const bool empty : {false, true}) {  // scans without returns, or none at all
-      const Flown run =
-          fly(r, defaults(), 20'000'000, [&](const LidarScanPtr& scan) -> LidarScanPtr {
-            if (scan->stamp >= from_seconds(silent_s)) return scan;
-            return empty ? without_returns(scan) : nullptr;
-          });
-      for (const Odometry& odometry : run.fast) {
-        if (odometry.stamp > from_seconds(std::max(silent_s, 1.0))) break;
-        EXPECT_EQ(odometry.status, OdometryStatus::kInitialising);
-      }
-      EXPECT_EQ(count(run, OdometryStatus::kLost), 0);
-      expect_a_sound_start(r, run, std::to_string(silent_s));
-    }
-  }
-}
-
-TEST(LidarInertialOdometry, StartsWhateverComesLateOrStopsBeforeTakeOff) {
-  const std::vector<std::pair<double, double>> outages{{0, 2}, {0.4, 1.3}, {1.5, 1.8}, {2, 4}};
-  for (const auto& [from_s, to_s] : outages) {
-    Recording r = first_seconds_of_standing(8);
-    std::erase_if(r.imu, [&, from = from_s, to = to_s](const ImuSample& s) {
-      return s.stamp > from_seconds(from) && s.stamp < from_seconds(to);
-    });
-    expect_a_sound_start(r, fly(r), "no IMU from " + std::to_string(from_s));
-    expect_a_sound_start(r,
-                         fly(r, defaults(), 20'000'000,
-                             [&, from = from_s, to = to_s](const LidarScanPtr& scan) {
-                               const bool out =
-                                   scan->end > from_seconds(from) && scan->stamp < from_seconds(to);
-                               return out ? without_returns(scan) : scan;
-                             }),
-                         "neither from " + std::to_string(from_s));
-  }
-}
-
-TEST(LidarInertialOdometry, TakesBackAStartOnFalseReturns) {
-  // The map of the start is noise; the true scans contradict it.
-  const Recording r = first_seconds_of_standing(8);
-  const Flown run = fly(r, defaults(), 20'000'000, [](const LidarScanPtr& scan) -> LidarScanPtr {
-    if (scan->stamp >= from_seconds(2)) return scan;
-    auto wrong = std::make_shared<LidarScan>(*scan);
-    for (LidarPoint& point : wrong->points) {
-      // A shell about the device: surfaces that the world does not have.
-      point.p_L = 2.5F * point.p_L.normalized();
-    }
-    return wrong;
-  });
-  expect_a_sound_start(r, run, "a shell of false returns");
-}
-
-TEST(LidarInertialOdometry, NamesWhatItWaitsFor) {
-  const Recording r = first_seconds_of_standing(3);
-  const auto need_at_end = [&](const std::function<void(Recording&)>& spoil) {
-    Recording spoilt = r;
-    spoil(spoilt);
-    const Flown run = fly(spoilt);
-    EXPECT_EQ(run.fast.back().status, OdometryStatus::kInitialising);
-    return run.need;
-  };
-  EXPECT_EQ(need_at_end([](Recording& s) { s.scans.clear(); }), OdometryNeed::kScan);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (LidarScanPtr& scan : s.scans) scan = without_returns(scan);
-            }),
-            OdometryNeed::kScan);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (LidarScanPtr& scan : s.scans) {
-                auto few = std::make_shared<LidarScan>(*scan);
-                few->points.resize(100);
-                scan = few;
-              }
-            }),
-            OdometryNeed::kReference);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (ImuSample& imu : s.imu) imu.gyro_radps.x() += 0.15;
-            }),
-            OdometryNeed::kGyroBias);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (std::size_t i = 0; i < s.imu.size(); ++i) {
-                s.imu[i].gyro_radps.y() += i % 2 == 0 ? 0.1 : -0.1;
-              }
-            }),
-            OdometryNeed::kGyroNoise);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (std::size_t i = 0; i < s.imu.size(); ++i) {
-                s.imu[i].accel_mps2.y() += i % 2 == 0 ? 1 : -1;
-              }
-            }),
-            OdometryNeed::kAccelNoise);
-  EXPECT_EQ(need_at_end([](Recording& s) {
-              for (ImuSample& imu : s.imu) imu.accel_mps2 *= 0.3;
-            }),
-            OdometryNeed::kAccelMagnitude);
-}
-
-// A vehicle that has left the ground keeps its map: it finds itself on it again.
-TEST(LidarInertialOdometry, DoesNotStartAgainInTheAir) {
-  const Flown run =
-      fly(forest(), defaults(), 20'000'000, [](const LidarScanPtr& scan) -> LidarScanPtr {
-        return scan->stamp < from_seconds(8) || scan->stamp >= from_seconds(12)
-                   ? scan
-                   : without_returns(scan);
-      });
-  bool started = false;
-  for (const Odometry& odometry : run.fast) {
-    started |= odometry.status == OdometryStatus::kOk;
-    if (!started) continue;
-    EXPECT_NE(odometry.status, OdometryStatus::kInitialising);
-  }
 }
 
 }  // namespace

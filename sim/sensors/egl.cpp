@@ -111,8 +111,6 @@ EglContext::EglContext(const EglOptions& options) : impl_(std::make_unique<Impl>
         "no EGL platform offers a headless OpenGL 4.5 context, expected a GPU's driver " +
         std::string("or Mesa's (libegl1, libegl-mesa0, libgl1-mesa-dri)"));
   }
-  const Current current(*this);
-  renderer_name_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
 }
 
 EglContext::~EglContext() { eglDestroyContext(impl_->display, impl_->context); }

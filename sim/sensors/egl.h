@@ -29,9 +29,6 @@ class EglContext {
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// GL_RENDERER, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)".
-  [[nodiscard]] const std::string& renderer_name() const { return renderer_name_; }
-
   /// Binds the context to this thread for the object's lifetime. Not to be nested.
   class Current {
    public:
@@ -47,7 +44,6 @@ class EglContext {
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
-  std::string renderer_name_;
 };
 
 }  // namespace arex::sim

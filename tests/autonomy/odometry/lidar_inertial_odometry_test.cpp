@@ -14,21 +14,7 @@
 namespace arex {
 namespace {
 
-using test::count;
-using test::defaults;
-using test::Flown;
-using test::fly;
-using test::forest;
-using test::kFrame;
-using test::kPeriod;
-using test::kRadius;
-using test::mounting;
-using test::position_error;
-using test::record;
-using test::Recording;
-using test::standing;
-using test::Tamper;
-using test::worst_error;
+using namespace test;
 
 TEST(StaticInitialiser, FindsDownAndTheGyroBias) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

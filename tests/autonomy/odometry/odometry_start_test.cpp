@@ -11,14 +11,7 @@
 namespace arex {
 namespace {
 
-using test::count;
-using test::defaults;
-using test::Flown;
-using test::fly;
-using test::forest;
-using test::position_error;
-using test::Recording;
-using test::standing;
+using namespace test;
 
 LidarScanPtr without_returns(const LidarScanPtr& scan) {
   auto none = std::make_shared<LidarScan>(*scan);

@@ -93,6 +93,15 @@ class FileSizeLimit {
   rlimit old_{};
 };
 
+TEST(BagWriter, NamesTheFileWhenTheDiskIsFullAtTheStart) {
+  const TemporaryFolder folder;
+  const auto file = folder / "flight.bag";
+  const FileSizeLimit limit(0);
+  const std::string message = message_of([&] { BagWriter(file, VehicleConfig{}); });
+  EXPECT_NE(message.find(file.string()), std::string::npos) << message;
+  EXPECT_NE(message.find("File too large"), std::string::npos) << message;
+}
+
 TEST(BagWriter, NamesTheFileWhenTheDiskFillsUp) {
   const TemporaryFolder folder;
   const auto file = folder / "flight.bag";

@@ -203,6 +203,19 @@ std::string format_value(const T& value) {
   }
 }
 
+/// The names that an enum may have, as the meaning of a parameter lists them.
+template <class T>
+std::string choices(const T& value) {
+  std::string text;
+  if constexpr (ConfigEnum<T>) {
+    for (const std::string_view name : enum_names(value)) {
+      text += (text.empty() ? " (" : "|") + std::string(name);
+    }
+    text += ")";
+  }
+  return text;
+}
+
 /// The `f` of fields() that lists every leaf with its dotted key, and where asked every section.
 class Lister {
  public:
@@ -213,7 +226,8 @@ class Lister {
   void operator()(std::string_view name, T& value, std::string_view meaning) {
     const std::string key = prefix_ + std::string(name);
     if constexpr (kIsScalar<T> || ConfigEnum<T> || kIsEigen<T> || kIsVector<T>) {
-      out_.push_back({key, format_value(value), unit_of(name), std::string(meaning)});
+      out_.push_back(
+          {key, format_value(value), unit_of(name), std::string(meaning) + choices(value)});
     } else {
       if (sections_) out_.push_back({key, "", "", std::string(meaning)});
       Lister nested(key + ".", out_, sections_);

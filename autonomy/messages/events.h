@@ -24,12 +24,13 @@ enum class EventKind : std::uint8_t {
   kBattery,         ///< detail: the decision taken
   kSensorFault,     ///< an injected or detected fault
   kCollision,       ///< detail: class and object hit, speed
+  kMapFull,         ///< a map has no room left; detail: which, and what is left out
   kFinished,        ///< detail: outcome and reason
 };
-inline constexpr std::array<std::string_view, 14> kEventKindNames{
+inline constexpr std::array<std::string_view, 15> kEventKindNames{
     "mission_state",  "armed",           "disarmed",  "target_selected", "target_reached",
     "target_dropped", "odometry_status", "planner",   "stuck",           "recovery",
-    "battery",        "sensor_fault",    "collision", "finished"};
+    "battery",        "sensor_fault",    "collision", "map_full",        "finished"};
 
 struct Event {
   Stamp stamp = 0;

@@ -115,7 +115,8 @@ void Perception::add(Stamp now, const RegisteredScan& scan) {
     std::copy_if(scan.points_O->begin(), scan.points_O->end(), std::back_inserter(near),
                  [&](const Vec3f& p) { return (p - p_OB).norm() <= range; });
     cloud_.insert(near);
-    return nullptr;
+    if (cloud_.refused() == 0 || std::exchange(refusal_told_, true)) return nullptr;
+    return [this] { cloud_cut_ = true; };
   });
   if (!config_.enabled) return;
   const bool with_map_2d = now >= next_map_2d_;

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <memory>
+#include <utility>
 
 #include "mapping/flown_trail.h"
 #include "mapping/mapper.h"
@@ -40,6 +41,9 @@ class Perception {
   /// Volume that the map knew when map_2d() was taken.
   [[nodiscard]] double known_volume_m3() const { return known_volume_m3_; }
 
+  /// Whether the cloud has begun to leave out what it has no room for; true once.
+  bool take_cloud_cut() { return std::exchange(cloud_cut_, false); }
+
   // What follows belongs to its lane: read it in a job of that lane, or when the jobs are drained.
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
   [[nodiscard]] const PointCloudMap& cloud() const { return cloud_; }
@@ -71,6 +75,8 @@ class Perception {
   std::shared_ptr<const GridSnapshot> grid_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;
   double known_volume_m3_ = 0;
+  bool refusal_told_ = false;  ///< in jobs of the cloud's lane
+  bool cloud_cut_ = false;
 };
 
 }  // namespace arex

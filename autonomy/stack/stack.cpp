@@ -122,6 +122,9 @@ std::optional<AttitudeCommand> Stack::tick() {
   if (const auto fault = lidar_watch_.update(now_)) {
     report(EventKind::kSensorFault, std::string(*fault));
   }
+  if (perception_.take_cloud_cut()) {
+    report(EventKind::kMapFull, "mapping.cloud.max_points is reached, later points are left out");
+  }
   decide();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();

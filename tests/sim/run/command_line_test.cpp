@@ -386,6 +386,31 @@ TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
   EXPECT_EQ(std::count(quiet.err.begin(), quiet.err.end(), '\n'), 1) << quiet.err;
 }
 
+TEST(CommandLine, ACloudThatIsCutIsAnEvent) {
+  const TemporaryFolder folder;
+  const Result result =
+      run({"run", kWaypoints, "--quiet", "--no-report", "--set", "mission.max_time_s=4", "--set",
+           "odometry.source=mocap", "--set", "mapping.use_depth=false", "--set",
+           "mapping.cloud.max_points=1000", "--out", (folder / "run").string()});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const std::string events = read_text(folder / "run/events.csv");
+  const auto at = events.find(",map_full,");
+  ASSERT_NE(at, std::string::npos) << events;
+  EXPECT_EQ(events.find(",map_full,", at + 1), std::string::npos) << "once";
+}
+
+TEST(CommandLine, ParametersListTheNamesThatTheyMayHave) {
+  const std::string params = run({"params"}).out;
+  const auto line_of = [&](const std::string& key) {
+    const auto at = params.find("\n" + key + " ");
+    return at == std::string::npos ? "" : params.substr(at + 1, params.find('\n', at + 1) - at);
+  };
+  EXPECT_NE(line_of("mission.kind").find("(waypoints|goals|explore|yaw_burst)"), std::string::npos)
+      << line_of("mission.kind");
+  EXPECT_NE(line_of("odometry.source").find("|mocap"), std::string::npos);
+  EXPECT_NE(line_of("world.kind").find("forest|"), std::string::npos);
+}
+
 TEST(CommandLine, RenderRefusesMomentsOutsideOfTheFlight) {
   const TemporaryFolder folder;
   ASSERT_EQ(run(short_run(folder)).exit_code, 1);

@@ -8,6 +8,14 @@
 #include <limits>
 
 namespace arex {
+namespace {
+
+/// A floor on the border between two layers has returns in both, and its noise in a third.
+constexpr int kFloorLayers = 2;
+/// Above the floor: what a vehicle descends through that hovers at the paper's flight height.
+constexpr double kAir_m = 1.5;
+
+}  // namespace
 
 HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const CellBox& box,
                        const Cell& brick_low, const Cell& brick_count)
@@ -18,16 +26,19 @@ HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const
       min_free_(config.min_free_cells),
       slope_(config.ground_max_slope * kBrickCells),
       support_(config.ground_support),
+      relief_(static_cast<int>(std::ceil(slope_)) + kFloorLayers),
+      air_(static_cast<int>(std::lround(kAir_m / resolution_m))),
       box_(box),
       brick_low_(brick_low),
       brick_count_(brick_count),
       tiles_(static_cast<std::size_t>(brick_count.x() * brick_count.y())),
       column_(static_cast<std::size_t>(brick_count.z())) {
-  const int ground = reference_ == BandReference::kGround ? kNoGround : 0;
-  for (Tile& tile : tiles_) tile.lowest = tile.ground = ground;
+  for (Tile& tile : tiles_) tile.lowest = tile.ground = kNoGround;
   map_ = map_geometry(box, resolution_m);
-  map_.cells.assign(static_cast<std::size_t>(map_.width) * static_cast<std::size_t>(map_.height),
-                    OccupancyMap2D::kUnknown);
+  const auto count = static_cast<std::size_t>(map_.width) * static_cast<std::size_t>(map_.height);
+  map_.cells.assign(count, OccupancyMap2D::kUnknown);
+  map_.floor.top.assign(count, FloorMap::kUnknown);
+  map_.floor.overhead.assign(count, FloorMap::kNothing);
   if (reference_ != BandReference::kGround) return;
   map_.ground.tile_m = resolution_m * kBrickCells;
   map_.ground.origin = brick_low.head<2>().cast<double>() * map_.ground.tile_m;
@@ -112,19 +123,30 @@ void HeightBand::spread_ground() {
     if (ground == tiles_[t].ground) continue;
     tiles_[t].ground = ground;
     tiles_[t].dirty = true;
+    if (map_.ground.heights.empty()) continue;
     map_.ground.heights[t] = ground < kNoGround / 2 ? static_cast<float>(ground * resolution_m_)
                                                     : std::numeric_limits<float>::quiet_NaN();
   }
 }
 
+std::size_t HeightBand::cell_of_bit(std::size_t t, unsigned bit) const {
+  const Eigen::Vector2i tile(static_cast<int>(t) % brick_count_.x(),
+                             static_cast<int>(t) / brick_count_.x());
+  const Eigen::Vector2i in(static_cast<int>(_pext_u32(bit, 0x15)),
+                           static_cast<int>(_pext_u32(bit, 0x2a)));
+  const Eigen::Vector2i cell =
+      (brick_low_.head<2>() + tile) * kBrickCells + in - box_.low.head<2>();
+  return map_.contains(cell) ? map_.index(cell) : map_.cells.size();
+}
+
 void HeightBand::evaluate(std::size_t t) {
-  const Tile& tile = tiles_[t];
+  const int base = reference_ == BandReference::kGround ? tiles_[t].ground : 0;
   std::uint64_t occupied = 0;
   std::array<std::uint64_t, 9> free{};  // free[n]: columns with at least n free cells
   free[0] = ~std::uint64_t{0};
-  if (tile.ground < kNoGround / 2) {
-    const int low = std::max(tile.ground + band_low_, box_.low.z());
-    const int high = std::min(tile.ground + band_high_, box_.high.z());
+  if (base < kNoGround / 2) {
+    const int low = std::max(base + band_low_, box_.low.z());
+    const int high = std::min(base + band_high_, box_.high.z());
     for (int z = low; z < high; ++z) {
       const int in = z - brick_low_.z() * kBrickCells;
       const States& states = column_[static_cast<std::size_t>(in / kBrickCells)];
@@ -138,17 +160,53 @@ void HeightBand::evaluate(std::size_t t) {
     }
   }
   const std::uint64_t enough = free[static_cast<std::size_t>(min_free_)];
-  const int x0 = (brick_low_.x() + static_cast<int>(t) % brick_count_.x()) * kBrickCells;
-  const int y0 = (brick_low_.y() + static_cast<int>(t) / brick_count_.x()) * kBrickCells;
   for (unsigned i = 0; i < 64; ++i) {
-    const int x = x0 + static_cast<int>(_pext_u32(i, 0x15));
-    const int y = y0 + static_cast<int>(_pext_u32(i, 0x2a));
-    const Eigen::Vector2i cell(x - box_.low.x(), y - box_.low.y());
-    if (!map_.contains(cell)) continue;
+    const std::size_t cell = cell_of_bit(t, i);
+    if (cell == map_.cells.size()) continue;
     const std::uint64_t bit = std::uint64_t{1} << i;
-    map_.cells[map_.index(cell)] = (occupied & bit) != 0 ? OccupancyMap2D::kOccupied
-                                   : (enough & bit) != 0 ? OccupancyMap2D::kFree
-                                                         : OccupancyMap2D::kUnknown;
+    map_.cells[cell] = (occupied & bit) != 0 ? OccupancyMap2D::kOccupied
+                       : (enough & bit) != 0 ? OccupancyMap2D::kFree
+                                             : OccupancyMap2D::kUnknown;
+  }
+}
+
+void HeightBand::survey_floor(std::size_t t) {
+  std::array<std::int16_t, 64> top{}, overhead{};
+  top.fill(FloorMap::kUnseen);
+  overhead.fill(FloorMap::kNothing);
+  const auto set = [](std::uint64_t bits, int z, std::array<std::int16_t, 64>& layers) {
+    for (; bits != 0; bits &= bits - 1) {
+      layers[static_cast<std::size_t>(std::countr_zero(bits))] = static_cast<std::int16_t>(z);
+    }
+  };
+  const int ground = tiles_[t].ground;
+  const bool has_ground = ground < kNoGround / 2;
+  const int air_low = ground + relief_, air_high = ground + air_;
+  std::uint64_t covered = 0, unknown = has_ground ? 0 : ~std::uint64_t{0};
+  for (int z = has_ground ? std::max(ground - 1, box_.low.z()) : box_.high.z(); z < box_.high.z();
+       ++z) {
+    const int in = z - brick_low_.z() * kBrickCells;
+    const States& states = column_[static_cast<std::size_t>(in / kBrickCells)];
+    if (z >= air_high && (states.known == nullptr || *states.occupied == BrickMask{})) {
+      z += kBrickCells - 1 - in % kBrickCells;  // nothing hangs in this brick
+      continue;
+    }
+    const std::uint64_t known = states.known ? layer(*states.known, in % kBrickCells) : 0;
+    const std::uint64_t full = states.known ? layer(*states.occupied, in % kBrickCells) : 0;
+    if (z < air_low) {
+      set(full, z, top);
+      continue;
+    }
+    set(full & ~covered, z, overhead);
+    covered |= full;
+    if (z < air_high) unknown |= ~known;
+  }
+  set(unknown & ~covered, FloorMap::kUnknown, top);
+  for (unsigned i = 0; i < 64; ++i) {
+    const std::size_t cell = cell_of_bit(t, i);
+    if (cell == map_.cells.size()) continue;
+    map_.floor.top[cell] = top[i];
+    map_.floor.overhead[cell] = overhead[i];
   }
 }
 

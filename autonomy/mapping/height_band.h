@@ -29,6 +29,10 @@ namespace arex {
 /// `ground_support` occupied voxels, limited by what the neighbours allow at `ground_max_slope`, so
 /// that a tile in which only a trunk was seen takes its neighbours' ground. No tile, no ground: the
 /// tile stays unknown. Works on 64 columns at a time.
+///
+/// Beside the band it says what it would be to land on a column (FloorMap): all that is occupied
+/// within a tile's relief about the ground is floor, with two layers for its noise; what is
+/// occupied above that hangs over it or stands on it.
 class HeightBand {
  public:
   /// The states of a brick; null pointers: nothing known.
@@ -50,7 +54,7 @@ class HeightBand {
   void refresh(const StatesOf& states_of) {
     if (!dirty_) return;
     dirty_ = false;
-    for (std::size_t t = 0; t < tiles_.size() && reference_ == BandReference::kGround; ++t) {
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
       if (!tiles_[t].dirty) continue;
       load(t, states_of);
       find_ground(tiles_[t]);
@@ -60,6 +64,7 @@ class HeightBand {
       if (!tiles_[t].dirty) continue;
       load(t, states_of);
       evaluate(t);
+      survey_floor(t);
       tiles_[t].dirty = false;
     }
   }
@@ -84,6 +89,9 @@ class HeightBand {
   void find_ground(Tile& tile);
   void spread_ground();
   void evaluate(std::size_t tile);
+  /// The floor's top, and what hangs over it, of the loaded column.
+  void survey_floor(std::size_t tile);
+  [[nodiscard]] std::size_t cell_of_bit(std::size_t tile, unsigned bit) const;
   /// The 8 x 8 voxels of a layer of the loaded column, bit = 2D Morton order.
   [[nodiscard]] static std::uint64_t layer(const BrickMask& mask, int z);
 
@@ -93,6 +101,8 @@ class HeightBand {
   int min_free_;
   double slope_;
   int support_;
+  int relief_;  ///< cells above the ground of a tile that are still its floor
+  int air_;     ///< cells above the ground that are to be known free
   CellBox box_;
   Cell brick_low_, brick_count_;
   std::vector<Tile> tiles_;

@@ -28,6 +28,17 @@ struct GroundHeights {
   }
 };
 
+/// The floor under each column of a 2D map, and what hangs over it, as the 3D map knows them; in
+/// layers of the map's resolution above O's origin. What landing asks for. Same cells as the map.
+struct FloorMap {
+  static constexpr std::int16_t kUnknown = -32768;  ///< the air over the ground is not wholly known
+  static constexpr std::int16_t kUnseen = -32767;   ///< the air is known free, no return from below
+  static constexpr std::int16_t kNothing = 32767;   ///< overhead: nothing seen
+
+  std::vector<std::int16_t> top;       ///< highest layer of the floor
+  std::vector<std::int16_t> overhead;  ///< lowest occupied layer above the floor's relief
+};
+
 /// The 2D occupancy map of the exploration in O: -1 unknown, 0 free, 1 occupied (paper,
 /// Environmental Modelling). Row-major, x fastest: cells[iy * width + ix].
 struct OccupancyMap2D {
@@ -43,7 +54,9 @@ struct OccupancyMap2D {
   /// Indices of the cells that the vehicle's centre flew through under the planner, each sharing a
   /// side with one before. Whatever the height band says about them: there is a way.
   std::vector<std::uint32_t> flown;
+  std::vector<float> flown_height_m;  ///< how high it was there, in O
   GroundHeights ground;  ///< empty where the map's height band does not stand on the ground
+  FloorMap floor;
 
   [[nodiscard]] Eigen::Vector2i cell_of(const Vec2& p) const {
     return ((p - origin) / resolution).array().floor().cast<int>();

@@ -141,6 +141,7 @@ void Perception::add_globally(const std::shared_ptr<const RayCaster>& rays, bool
                    return [this, volume = mapper_.global().known_volume(),
                            map_2d = std::make_shared<OccupancyMap2D>(mapper_.occupancy_2d())] {
                      map_2d->flown = trail_.cells();
+                     map_2d->flown_height_m = trail_.heights_m();
                      map_2d_ = map_2d;
                      known_volume_m3_ = volume;
                    };

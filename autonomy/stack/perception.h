@@ -26,7 +26,7 @@ class Perception {
   /// nothing of the time after.
   void forget_local(Stamp now);
   /// Where the vehicle goes under the planner: the 2D map keeps that way open.
-  void note_flown(const Vec3& p_OB) { trail_.add(p_OB.head<2>()); }
+  void note_flown(const Vec3& p_OB) { trail_.add(p_OB); }
   /// An undistorted frame of the odometry.
   void add_scan(Stamp now, const ScanUpdate& update);
   /// A raw frame, placed by the poses kept: for odometry sources that don't undistort.
@@ -37,6 +37,12 @@ class Perception {
   [[nodiscard]] const std::shared_ptr<const GridSnapshot>& grid() const { return grid_; }
   /// The newest 2D map; null before the first.
   [[nodiscard]] const std::shared_ptr<const OccupancyMap2D>& map_2d() const { return map_2d_; }
+
+  /// Cells flown through since map_2d() was made. @pre there is one
+  [[nodiscard]] std::vector<std::uint32_t> flown_since_map() const {
+    const auto known = static_cast<std::ptrdiff_t>(map_2d_->flown.size());
+    return {trail_.cells().begin() + known, trail_.cells().end()};
+  }
 
   /// Volume that the map knew when map_2d() was taken.
   [[nodiscard]] double known_volume_m3() const { return known_volume_m3_; }

@@ -26,12 +26,12 @@ TEST(FlownTrail, IsAChainOfAllCellsBetweenThePlaces) {
     FlownTrail trail(map);
     std::set<std::uint32_t> flown;
     Vec2 p(0.03, 0.04);
-    trail.add(p);
+    trail.add({p.x(), p.y(), 1.5});
     for (int k = 0; k < 400; ++k) {
       // Inside the map, in steps of up to three cells.
       Vec2 next = p + Vec2(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3));
       next = next.cwiseMax(Vec2(-2.95, -1.95)).cwiseMin(Vec2(2.95, 1.95));
-      trail.add(next);
+      trail.add({next.x(), next.y(), 1.5});
       for (int i = 0; i <= 100; ++i) {
         const Vec2 on = p + (next - p) * (i / 100.0);
         flown.insert(static_cast<std::uint32_t>(map.index(map.cell_of(on))));
@@ -56,10 +56,19 @@ TEST(FlownTrail, IsAChainOfAllCellsBetweenThePlaces) {
 
 TEST(FlownTrail, LeavesOutWhatLiesOffTheMap) {
   FlownTrail trail(geometry());
-  trail.add({2.75, 0.05});
-  trail.add({3.75, 0.05});  // the map ends at 3
-  trail.add({3.75, -5});
+  trail.add({2.75, 0.05, 1});
+  trail.add({3.75, 0.05, 1});  // the map ends at 3
+  trail.add({3.75, -5, 1});
   EXPECT_EQ(trail.cells().size(), 3u);
+}
+
+TEST(FlownTrail, KnowsHowHighItWasAndBridgesNoJump) {
+  FlownTrail trail(geometry());
+  trail.add({0.05, 0.05, 1.0});
+  trail.add({0.25, 0.05, 1.8});
+  trail.add({2.05, 1.05, 0.5});  // a jump of the pose: nobody flew there
+  ASSERT_EQ(trail.cells().size(), 4u);
+  EXPECT_EQ(trail.heights_m(), (std::vector<float>{1.0F, 1.8F, 1.8F, 0.5F}));
 }
 
 }  // namespace

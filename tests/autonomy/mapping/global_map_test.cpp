@@ -215,6 +215,41 @@ TEST(GlobalMap, StandsItsHeightBandOnTheGround) {
   EXPECT_NEAR(free, 130 * 160 - 2, 2);
 }
 
+TEST(GlobalMap, KnowsTheFloorUnderEachColumnAndWhatStandsOnIt) {
+  for (const auto band : {BandReference::kGround, BandReference::kAbsolute}) {
+    GlobalMapConfig config = scene_config();
+    config.band = band;
+    config.ground_max_slope = 0.03;
+    GlobalMap map(config, kResolution);
+    Painter painter(map);
+    for (double x = -7.95; x < 6; x += 0.1) {
+      for (double y = -7.95; y < 8; y += 0.1) {
+        const bool car = x > -4 && x < -2 && y > 0 && y < 4;
+        if (car) {
+          painter.occupied({x, y, 0.85});
+          painter.free_between({x, y, 3}, {x, y, 0.85});
+          continue;
+        }
+        painter.free_between({x, y, 3}, {x, y, 0.05});
+        if (x < 4) painter.occupied({x, y, 0.05});
+      }
+    }
+    painter.occupied({0.05, 0.05, 0.35});   // on the floor, below the 2D map's band
+    painter.occupied({1.05, -4.05, 2.45});  // hangs high
+    painter.show();
+    const OccupancyMap2D& out = map.occupancy_2d();
+    const auto index = [&](double x, double y) { return out.index(out.cell_of({x, y})); };
+    EXPECT_EQ(out.floor.top[index(-6.05, -3.05)], 0);
+    EXPECT_EQ(out.floor.overhead[index(-6.05, -3.05)], FloorMap::kNothing);
+    EXPECT_EQ(out.floor.top[index(5.05, 1.05)], FloorMap::kUnseen);  // air known, floor not seen
+    EXPECT_EQ(out.floor.top[index(7.05, 1.05)], FloorMap::kUnknown);
+    EXPECT_EQ(out.floor.overhead[index(-3.05, 2.05)], 8);
+    EXPECT_EQ(out.floor.overhead[index(0.05, 0.05)], 3);
+    EXPECT_EQ(out.floor.overhead[index(1.05, -4.05)], 24);
+    EXPECT_EQ(out.floor.top[index(1.05, -4.05)], 0);
+  }
+}
+
 TEST(GlobalMap, TakesTheNeighboursGroundUnderATrunkSeenAlone) {
   GlobalMap map(scene_config(), kResolution);
   Painter painter(map);

@@ -15,6 +15,10 @@ constexpr double kBlocked = -1.0;
 /// Ends of partial guides that differ by less in what is left to the target are equally near: a
 /// wall of half a metre with the distance kept from its two sides.
 constexpr double kSameNearness_m = 2.0;
+constexpr double kRounding = 1e-6;
+/// Extra cost of a metre where nothing but the inflation fits, in comfort weights: only where there
+/// is no other way, or one many times as long.
+constexpr double kTight = 4.0;
 
 /// The map grown by everything that the search may enter, as the cost of a metre in each cell. Its
 /// outermost cells are blocked: every neighbour of a passable cell is in it.
@@ -29,6 +33,7 @@ class CostMap {
     size_ = high - low_ + Eigen::Vector2i::Ones();
     measure_distances();
     const double near = config.obstacle_distance_m;
+    const double tight = near - map.resolution;  // the inflation: what the explorer calls reachable
     cost_.resize(distance_.size());
     for (int y = 0; y < size_.y(); ++y) {
       for (int x = 0; x < size_.x(); ++x) {
@@ -40,7 +45,9 @@ class CostMap {
         };
         const bool at_edge = x == 0 || y == 0 || x == size_.x() - 1 || y == size_.y() - 1;
         if (at_edge || d <= 0 || (d < near && !at_end())) {
-          cost_[i] = kBlocked;
+          const bool fits =
+              !at_edge && d > 0 && d > tight - kRounding && map.at(cell) == OccupancyMap2D::kFree;
+          cost_[i] = fits ? 1.0 + kTight * config.comfort_weight : kBlocked;
           continue;
         }
         cost_[i] = 1.0;

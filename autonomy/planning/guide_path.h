@@ -55,7 +55,8 @@ struct GuidePath {
 /// corners not cut, then pulled straight where that is no dearer. Outside the map everything is
 /// unknown, and unknown cells may be crossed at a cost. Start and goal may lie too close to
 /// obstacles: the cells within obstacle_distance_m of either may be crossed unless occupied. Cells
-/// that were flown through may always be crossed.
+/// that were flown through may always be crossed. Known-free cells that are nearer to obstacles by
+/// a cell may be where there is no other way: what the explorer calls reachable is not closed here.
 /// A target that cannot be reached may be as near from several places: the two sides of a wall, of
 /// which now one, now the other is nearer by a cell as scans come in. The path ends on the side
 /// that costs least to get to, which the way there only makes cheaper.

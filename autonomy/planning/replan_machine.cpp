@@ -376,7 +376,8 @@ void ReplanMachine::recover(const GridView& grid, const Odometry& odometry, Stam
     return;  // the next tick brings a newer grid and another seed
   }
   tries_ = 0;
-  if (recoveries_[1] < kMaxRetreats && try_back_off(grid, start, begin, now)) return;
+  const bool may_retreat = recoveries_[1] < kMaxRetreats || is_trapped(grid, start);
+  if (may_retreat && try_back_off(grid, start, begin, now)) return;
   give_up(cause, now);
   enter(ReplanState::kWaitTarget, now);
 }
@@ -392,6 +393,21 @@ bool ReplanMachine::try_escape(const GridView& grid, const MotionState& start, S
   report(PlannerEventKind::kEscape, now, StuckCause::kStartInInflation);
   enter(ReplanState::kExecTraj, now);
   return true;
+}
+
+/// Whether no plan leads even to where it was a retreat and a half ago: what has closed is not the
+/// way to the target, but the one behind it.
+bool ReplanMachine::is_trapped(const GridView& grid, const MotionState& start) {
+  const double back = 1.5 * config_.back_off_m;
+  const auto before = std::find_if(track_.rbegin(), track_.rend(),
+                                   [&](const Vec3& p) { return (p - start.p).norm() >= back; });
+  if (before == track_.rend()) return false;
+  PlanRequest request;
+  request.start = start;
+  request.goal = *before;
+  request.may_graze = true;
+  request.seed = seed_;
+  return !planner_.plan(grid, request).ok();
 }
 
 bool ReplanMachine::try_back_off(const GridView& grid, const MotionState& start, Stamp begin,

@@ -110,7 +110,8 @@ struct PlannerEvent {
 /// planning_latency_s later, from the state that the trajectory then in force has at that moment:
 /// position, velocity and acceleration are continuous.
 /// When plans fail, recoveries are tried in turn: out of the inflation along the gradient of
-/// clearance; back along the flown path; another target (needs_target() with the cause).
+/// clearance; back along the flown path, which it knows to be free because it flew it, on and on
+/// while no plan leads even back there; another target (needs_target() with the cause).
 class ReplanMachine {
  public:
   ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner, const YawConfig& yaw,
@@ -180,6 +181,7 @@ class ReplanMachine {
   void recover(const GridView& grid, const Odometry& odometry, Stamp now);
   [[nodiscard]] bool try_escape(const GridView& grid, const MotionState& start, Stamp begin,
                                 Stamp now);
+  [[nodiscard]] bool is_trapped(const GridView& grid, const MotionState& start);
   [[nodiscard]] bool try_back_off(const GridView& grid, const MotionState& start, Stamp begin,
                                   Stamp now);
   void stop(const GridView& grid, Stamp now, StuckCause cause);

@@ -189,6 +189,40 @@ TEST(ReplanMachine, StopsWhenAWallAppearsAndSaysWhy) {
   EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
 }
 
+TEST(ReplanMachine, FliesBackAllTheWayOutOfAPocketThatClosesBehindIt) {
+  test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {1.05, 4.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({9.05, 4.05, 1.05}, {}, flight.now_);
+  flight.run(grid.view(), 30);
+  ASSERT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+  // Inflation, all around it and 5 m of the way that it came; nothing stands on the way itself.
+  grid.mark({30, 0, 0}, {84, 79, 19}, GridView::kInflated);
+  grid.mark({95, 0, 0}, {159, 79, 19}, GridView::kInflated);
+  machine.set_target({1.05, 7.05, 1.05}, {}, flight.now_);
+  flight.run(grid.view(), 60);
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 2);
+  EXPECT_GE(flight.count(PlannerEventKind::kBackOff), 3);
+  EXPECT_FALSE(flight.occupied_);
+  EXPECT_LT(flight.p_jump_, 1e-3);
+}
+
+TEST(ReplanMachine, DoesNotFlyBackForATargetThatIsShutIn) {
+  test::TestGrid grid(160, 80, 20);
+  ReplanMachine machine = make_machine();
+  Flight flight(machine, {1.05, 4.05, 1.05});
+  flight.step(grid.view());
+  machine.set_target({9.05, 4.05, 1.05}, {}, flight.now_);
+  flight.run(grid.view(), 30);
+  grid.mark({105, 0, 0}, {110, 79, 19}, GridView::kInflated);
+  machine.set_target({14.05, 4.05, 1.05}, {}, flight.now_);
+  flight.run(grid.view(), 60);
+  EXPECT_TRUE(machine.needs_target());
+  EXPECT_EQ(flight.count(PlannerEventKind::kBackOff), 1);
+  EXPECT_GT(flight.last_.p_OB.x(), 6.5);
+}
+
 TEST(ReplanMachine, EscapesFromAnInflationThatGrowsOverIt) {
   test::TestGrid grid(100, 100, 20);
   ReplanMachine machine = make_machine();

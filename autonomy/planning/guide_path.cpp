@@ -33,7 +33,8 @@ class CostMap {
     size_ = high - low_ + Eigen::Vector2i::Ones();
     measure_distances();
     const double near = config.obstacle_distance_m;
-    const double tight = near - map.resolution;  // the inflation: what the explorer calls reachable
+    const double tight =
+        near - config.margin_m;  // the inflation: what the explorer calls reachable
     cost_.resize(distance_.size());
     for (int y = 0; y < size_.y(); ++y) {
       for (int x = 0; x < size_.x(); ++x) {

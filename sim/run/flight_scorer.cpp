@@ -106,6 +106,8 @@ FlightScore FlightScorer::score(const Truth& truth, const Stack& stack) const {
   score.odometry = score_odometry(poses_);
   score.odometry_lost_s = odometry_lost_s_;
   score.clearance = clearance_.statistics();
+  if (stack.mission().state() == MissionState::kDone)
+    score.landing = score_landing(clearance_, truth.X_WB);
   if (!thin_.empty()) score.thin = thin_.score();
   return score;
 }

@@ -7,6 +7,7 @@
 #include "physics/physics.h"
 #include "run/recorder.h"
 #include "scoring/clearance.h"
+#include "scoring/landing.h"
 #include "scoring/odometry_error.h"
 #include "scoring/thin_branches.h"
 #include "stack/stack.h"
@@ -26,6 +27,7 @@ struct FlightScore {
   OdometryScore odometry;
   double odometry_lost_s = 0;
   ClearanceMeter::Statistics clearance;
+  std::optional<LandingScore> landing;  ///< of a vehicle that came down and disarmed
   std::optional<ThinBranchScore> thin;  ///< where the world has thin branches
 };
 

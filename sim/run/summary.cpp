@@ -64,6 +64,7 @@ void add_flight(const FlightScore& flight, Figures& figures) {
   add_figures(flight.odometry, figures);
   if (!flight.poses.empty()) figures.set("odometry.lost_s", flight.odometry_lost_s);
   add_figures(flight.clearance, figures);
+  if (flight.landing) add_figures(*flight.landing, figures);
   if (flight.thin) add_figures(*flight.thin, figures);
 }
 

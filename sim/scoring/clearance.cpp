@@ -62,6 +62,11 @@ double ClearanceMeter::measure(const Truth& truth, double max_m) {
   return clearance;
 }
 
+double ClearanceMeter::distance(const Pose& X_WB, worlds::ClassSet classes, double max_m) const {
+  for (const Vec3& p_B : points_B_) max_m = scene_.distance_to_surface(X_WB * p_B, max_m, classes);
+  return max_m;
+}
+
 ClearanceMeter::Statistics ClearanceMeter::statistics() const {
   if (samples_.empty()) return {};
   std::vector<double> sorted = samples_;

@@ -28,6 +28,9 @@ class ClearanceMeter {
   };
   [[nodiscard]] Statistics statistics() const;
 
+  /// Distance from the airframe to the nearest surface of these classes, m, at most `max_m`.
+  [[nodiscard]] double distance(const Pose& X_WB, worlds::ClassSet classes, double max_m) const;
+
   [[nodiscard]] const std::vector<Vec3>& points_B() const { return points_B_; }
 
  private:

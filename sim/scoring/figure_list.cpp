@@ -152,6 +152,12 @@ std::vector<FigureInfo> flight_figures() {
        "airframe to the nearest surface on the way, leaves left out; 5 m stand for 5 m and "
        "more"},
       {"clearance.p05_m", "clearance, 5th percentile", "m", kMore, false, "of the same, at 20 Hz"},
+      {"landing.on_floor", "landed on the floor", "", kMore, false,
+       "1: it stands on ground, floor or ramp; 0: on something else; null unless it came down and "
+       "disarmed"},
+      {"landing.clearance_m", "clearance where it landed", "m", kMore, false,
+       "airframe to the nearest surface that is no ground, floor or ramp, leaves left out; 5 m "
+       "stand for 5 m and more"},
       {"thin.branches", "thin branches passed", "", kNeither, false,
        "within scoring.thin.corridor_m; worlds that have some"},
       {"thin.seen_in_time", "thin branches seen in time", "", kNeither, false,

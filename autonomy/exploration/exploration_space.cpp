@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "mapping/distance_transform.h"
 #include "mapping/line_walk.h"
 
 namespace arex {
@@ -12,16 +13,17 @@ namespace {
 // Straight and diagonal steps in integers: 99/70 is the square root of 2 to 4 digits, and integer
 // costs make a whole priority queue of a ring of buckets.
 constexpr std::uint32_t kStraight = 70, kDiagonal = 99;
-constexpr std::int32_t kNoObstacle = std::numeric_limits<std::int32_t>::max();
 
 }  // namespace
 
 ExplorationSpace::ExplorationSpace(const OccupancyMap2D& map, const ExplorationBounds& bounds,
-                                   const SpaceConfig& config, const Vec2& robot)
+                                   const SpaceConfig& config, const Vec2& robot,
+                                   std::span<const std::uint32_t> flown_since)
     : map_(map), bounds_(bounds), config_(config) {
   classify();
   measure_clearance();
   for (const std::uint32_t cell : map_.flown) flags_[cell] |= kPassable;
+  for (const std::uint32_t cell : flown_since) flags_[cell] |= kPassable;
   travel_.assign(flags_.size(), kFar);
   find_start(robot);
   if (map_.contains(map_.cell_of(robot))) flood(robot);
@@ -49,62 +51,15 @@ void ExplorationSpace::classify() {
   }
 }
 
-/// Exact squared distance transform, then the cells that the vehicle's centre may pass.
-/// Source: Meijster, Roerdink and Hesselink, A general algorithm for computing distance transforms
-/// in linear time, 2000.
+/// The cells that the vehicle's centre may pass.
 void ExplorationSpace::measure_clearance() {
-  const int width = map_.width, height = map_.height;
-  const int none = width + height;  // further than any cell
-  clearance_.assign(flags_.size(), kNoObstacle);
-  std::vector<int> column(flags_.size(), none);  // to the nearest obstacle in the same column
-  const auto w = static_cast<std::size_t>(width);
-  for (std::size_t i = 0; i < column.size(); ++i) {
-    if (map_.cells[i] == OccupancyMap2D::kOccupied) {
-      column[i] = 0;
-    } else if (i >= w) {
-      column[i] = std::min(none, column[i - w] + 1);
-    }
-  }
-  for (std::size_t i = column.size(); i-- > w;) {
-    column[i - w] = std::min(column[i - w], column[i] + 1);
-  }
+  clearance_ = squared_distances(map_.width, map_.height, [&](std::size_t i) {
+    return map_.cells[i] == OccupancyMap2D::kOccupied;
+  });
   const double radius_cells = config_.travel_radius_m / map_.resolution;
   const double passable = radius_cells * radius_cells - 1e-6;
-  std::vector<int> site(w), from(w);  // the lower envelope: its parabolas and where each begins
-  for (int y = 0; y < height; ++y) {
-    const std::size_t base = static_cast<std::size_t>(y) * w;
-    int top = -1;
-    const auto value = [&](int x, int i) {
-      const int g = column[base + static_cast<std::size_t>(i)];
-      return (x - i) * (x - i) + g * g;
-    };
-    for (int u = 0; u < width; ++u) {
-      if (column[base + static_cast<std::size_t>(u)] >= none) continue;
-      while (top >= 0) {
-        const auto t = static_cast<std::size_t>(top);
-        if (value(from[t], site[t]) <= value(from[t], u)) break;
-        --top;
-      }
-      int begin = 0;
-      if (top >= 0) {
-        const int i = site[static_cast<std::size_t>(top)];
-        const int rise = value(0, u) - value(0, i);  // u^2 - i^2 + g(u)^2 - g(i)^2
-        begin = 1 + static_cast<int>(std::floor(static_cast<double>(rise) / (2 * (u - i))));
-      }
-      if (begin >= width) continue;
-      ++top;
-      site[static_cast<std::size_t>(top)] = u;
-      from[static_cast<std::size_t>(top)] = begin;
-    }
-    for (int x = width - 1; x >= 0; --x) {
-      const std::size_t i = base + static_cast<std::size_t>(x);
-      if (top >= 0) {
-        const auto t = static_cast<std::size_t>(top);
-        clearance_[i] = value(x, site[t]);
-        if (x == from[t]) --top;
-      }
-      if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kClear | kPassable;
-    }
+  for (std::size_t i = 0; i < flags_.size(); ++i) {
+    if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kClear | kPassable;
   }
 }
 
@@ -198,17 +153,9 @@ void ExplorationSpace::flood(const Vec2& robot) {
   }
 }
 
-std::optional<Vec2> ExplorationSpace::nearest_clearing(double clearance_m) const {
-  std::optional<Eigen::Vector2i> nearest;
-  for (int y = 0; y < map_.height; ++y) {
-    for (int x = 0; x < map_.width; ++x) {
-      const Eigen::Vector2i cell(x, y);
-      if (!is_reachable(cell) || !is_free(cell) || clearance(cell) < clearance_m) continue;
-      if (!nearest || travel_[map_.index(cell)] < travel_[map_.index(*nearest)]) nearest = cell;
-    }
-  }
-  if (!nearest) return std::nullopt;
-  return map_.centre_of(*nearest);
+bool ExplorationSpace::reaches_flown() const {
+  return std::all_of(map_.flown.begin(), map_.flown.end(),
+                     [&](std::uint32_t cell) { return travel_[cell] != kFar; });
 }
 
 bool ExplorationSpace::is_frontier(const Eigen::Vector2i& cell) const {

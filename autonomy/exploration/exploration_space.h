@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "exploration/exploration_bounds.h"
@@ -32,13 +33,14 @@ struct SpaceConfig {
 /// is free or unknown inside the bounds, how far the nearest obstacle is, where the vehicle can go
 /// through known-free space and how far that is, how much is unknown around a point.
 /// Positions in O; distances in m. The map must outlive this; what lies outside the map's array is
-/// not explored.
+/// not explored. `flown_since`: cells flown through since the map was made.
 class ExplorationSpace {
  public:
   static constexpr double kUnreachable = std::numeric_limits<double>::infinity();
 
   ExplorationSpace(const OccupancyMap2D& map, const ExplorationBounds& bounds,
-                   const SpaceConfig& config, const Vec2& robot);
+                   const SpaceConfig& config, const Vec2& robot,
+                   std::span<const std::uint32_t> flown_since = {});
 
   [[nodiscard]] const OccupancyMap2D& map() const { return map_; }
   [[nodiscard]] const ExplorationBounds& bounds() const { return bounds_; }
@@ -75,9 +77,9 @@ class ExplorationSpace {
   /// The reachable cell nearest to p within the start reach; none if there is none.
   [[nodiscard]] std::optional<Eigen::Vector2i> nearest_reachable(const Vec2& p) const;
 
-  /// The centre of the reachable free cell, as far as this from obstacles, to which the way is the
-  /// shortest; none if there is none.
-  [[nodiscard]] std::optional<Vec2> nearest_clearing(double clearance_m) const;
+  /// Whether the vehicle reaches all that it flew through from where it is. If not, it stands in a
+  /// pocket of the 2D map, and that nothing more can be reached says nothing.
+  [[nodiscard]] bool reaches_flown() const;
 
   /// f_I: unknown area, m^2, of the cells inside the bounds whose centres lie within the
   /// information radius of p.

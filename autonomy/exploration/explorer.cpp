@@ -5,6 +5,12 @@
 
 namespace arex {
 
+Vec3 at_flight_height(const ExplorerConfig& config, const Vec2& place, const OccupancyMap2D& map) {
+  // Ground is known wherever a column is known free, which all that is flown to is.
+  const double ground = config.follow_ground ? map.ground.at(place) : 0.0;
+  return {place.x(), place.y(), config.flight_height_m + (std::isfinite(ground) ? ground : 0.0)};
+}
+
 Explorer::Explorer(const ExplorerConfig& config, double resolution_m, std::uint64_t seed)
     : config_(config),
       detector_(config.detector, seed),
@@ -15,7 +21,8 @@ Decision Explorer::decide(const OccupancyMap2D& map, const ExplorerInput& input)
   Decision decision;
   decision.stamp = input.now;
   decision.sequence = sequence_++;
-  const ExplorationSpace space(map, config_.bounds, config_.space, input.p_OB.head<2>());
+  const ExplorationSpace space(map, config_.bounds, config_.space, input.p_OB.head<2>(),
+                               input.flown_since);
   detector_.update(space);
   balance(decision, space, input);
   decision.previous_end = settle_target(space, input);
@@ -26,14 +33,15 @@ Decision Explorer::decide(const OccupancyMap2D& map, const ExplorerInput& input)
   } else if (target_) {
     decision.kind = DecisionKind::kKeepTarget;
     set_goal(decision, map);
-  } else if (!space.has_start()) {
+  } else if (!space.has_start() && space.reaches_flown()) {
     decision.kind = DecisionKind::kWait;
+  } else if (way_back_O_ && input.progress == TargetProgress::kUnderWay && !space.reaches_flown()) {
+    decision.kind = DecisionKind::kKeepTarget;
+    decision.goal_O = *way_back_O_;
   } else {
+    if (way_back_O_ && input.progress == TargetProgress::kUnreachable) ++lost_ways_back_;
+    way_back_O_.reset();
     choose(decision, space, input);
-  }
-  if (decision.kind == DecisionKind::kStop && !config_.stop.return_home) {
-    const auto place = space.nearest_clearing(config_.stop.landing_clearance_m);
-    if (place) decision.landing_O = at_flight_height(*place, map);
   }
   return decision;
 }
@@ -147,7 +155,27 @@ void Explorer::choose(Decision& decision, const ExplorationSpace& space,
        {CandidateSource::kTrees, CandidateSource::kExhaustive, CandidateSource::kForgiving}) {
     if (ask(source, decision, space, input)) return select(decision, space.map());
   }
-  stop(decision, space);
+  if (!go_back(decision, space, input)) stop(decision, space);
+}
+
+bool Explorer::go_back(Decision& decision, const ExplorationSpace& space,
+                       const ExplorerInput& input) {
+  constexpr int kTries = 3;
+  const OccupancyMap2D& map = space.map();
+  if (space.reaches_flown() || lost_ways_back_ >= kTries) return false;
+  const auto width = static_cast<std::uint32_t>(map.width);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < map.flown.size(); ++k) {
+    const Eigen::Vector2i cell(static_cast<int>(map.flown[k] % width),
+                               static_cast<int>(map.flown[k] / width));
+    const double distance = (map.centre_of(cell) - input.p_OB.head<2>()).norm();
+    if (space.is_reachable(cell) || distance >= nearest) continue;
+    nearest = distance;
+    way_back_O_ = Vec3(map.centre_of(cell).x(), map.centre_of(cell).y(), map.flown_height_m[k]);
+  }
+  decision.kind = DecisionKind::kGoBack;
+  decision.goal_O = *way_back_O_;
+  return true;
 }
 
 bool Explorer::ask(CandidateSource source, Decision& decision, const ExplorationSpace& space,
@@ -174,6 +202,7 @@ void Explorer::select(Decision& decision, const OccupancyMap2D& map) {
   if (config_.revenue.direction_aware) {
     apply_direction_filter(decision.candidates, config_.filter);
   }
+  lost_ways_back_ = 0;
   decision.winner = best_candidate(decision.candidates);
   const Candidate& winner = decision.candidates[*decision.winner];
   target_ = Target{winner.point, winner.viewpoint};
@@ -185,14 +214,8 @@ void Explorer::select(Decision& decision, const OccupancyMap2D& map) {
 void Explorer::set_goal(Decision& decision, const OccupancyMap2D& map) const {
   const Vec2 look = target_->point - target_->viewpoint;
   decision.target = target_->point;
-  decision.goal_O = at_flight_height(target_->viewpoint, map);
+  decision.goal_O = at_flight_height(config_, target_->viewpoint, map);
   decision.goal_yaw_rad = std::atan2(look.y(), look.x());
-}
-
-Vec3 Explorer::at_flight_height(const Vec2& place, const OccupancyMap2D& map) const {
-  // Ground is known wherever a column is known free, which all that is flown to is.
-  const double ground = config_.follow_ground ? map.ground.at(place) : 0.0;
-  return {place.x(), place.y(), config_.flight_height_m + (std::isfinite(ground) ? ground : 0.0)};
 }
 
 }  // namespace arex

@@ -49,6 +49,10 @@ struct ExplorerConfig {
   }
 };
 
+/// Where the vehicle flies over a place.
+[[nodiscard]] Vec3 at_flight_height(const ExplorerConfig& config, const Vec2& place,
+                                    const OccupancyMap2D& map);
+
 /// How the vehicle fares with the target of the last decision.
 enum class TargetProgress : std::uint8_t { kUnderWay, kReached, kUnreachable };
 
@@ -58,16 +62,19 @@ struct ExplorerInput {
   Vec3 home_O = Vec3::Zero();
   TargetProgress progress = TargetProgress::kUnderWay;
   ConsumptionModel energy;
+  /// Cells flown through since the map was made: what OccupancyMap2D::flown will say next.
+  std::vector<std::uint32_t> flown_since;
 };
 
 enum class DecisionKind : std::uint8_t {
   kNewTarget,
   kKeepTarget,
   kStop,
-  kWait,  ///< the vehicle knows no free space around itself yet
+  kWait,    ///< the vehicle knows no free space around itself yet
+  kGoBack,  ///< its place is cut off from what it has explored: to where it flew last
 };
-inline constexpr std::array<std::string_view, 4> kDecisionKindNames{"new_target", "keep_target",
-                                                                    "stop", "wait"};
+inline constexpr std::array<std::string_view, 5> kDecisionKindNames{"new_target", "keep_target",
+                                                                    "stop", "wait", "go_back"};
 
 /// How the target before this decision ended.
 enum class TargetEnd : std::uint8_t {
@@ -97,7 +104,8 @@ struct Decision {
   DecisionKind kind = DecisionKind::kWait;
   TargetEnd previous_end = TargetEnd::kNone;
   StopReason stop_reason = StopReason::kNone;
-  /// New or kept target: where to fly and where to look from there, and the frontier point itself.
+  /// New or kept target, or the way back: where to fly and where to look from there, and the
+  /// frontier point itself.
   Vec3 goal_O = Vec3::Zero();
   double goal_yaw_rad = 0;
   Vec2 target = Vec2::Zero();
@@ -107,8 +115,6 @@ struct Decision {
   /// Of a stop for want of candidates: the largest f_I of all frontiers that the exhaustive search
   /// still reaches, whatever the filters and the blacklist made of them.
   std::optional<double> open_frontier_m2;
-  /// Of a stop that does not lead home: above the nearest clearing; none if none is reachable.
-  std::optional<Vec3> landing_O;
   double home_distance_m = 0;  ///< along the known path
   EnergyBalance energy;
 };
@@ -140,6 +146,9 @@ class Explorer {
   /// Asks one source. @return whether it has a candidate worth the flight
   bool ask(CandidateSource source, Decision& decision, const ExplorationSpace& space,
            const ExplorerInput& input) const;
+  /// Back to the nearest place that it flew through, but does not reach any more. @return whether
+  /// there is one to try
+  bool go_back(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input);
   void stop(Decision& decision, const ExplorationSpace& space) const;
   void select(Decision& decision, const OccupancyMap2D& map);
   /// Whether there still is something to see at a target: enough unknown area, and a border to it.
@@ -147,7 +156,6 @@ class Explorer {
   [[nodiscard]] std::vector<Candidate> assess(CandidateSource source, const ExplorationSpace& space,
                                               const ExplorerInput& input) const;
   void set_goal(Decision& decision, const OccupancyMap2D& map) const;
-  [[nodiscard]] Vec3 at_flight_height(const Vec2& place, const OccupancyMap2D& map) const;
 
   ExplorerConfig config_;
   FrontierDetector detector_;
@@ -155,6 +163,8 @@ class Explorer {
   Blacklist blacklist_;
   TargetHistory history_;
   std::optional<Target> target_;
+  std::optional<Vec3> way_back_O_;  ///< where it is under way to instead
+  int lost_ways_back_ = 0;          ///< that failed since the last target
   int sequence_ = 0;
 };
 

@@ -50,7 +50,7 @@ MotionRequest Mission::update(const Inputs& inputs) {
       explore(inputs);
       break;
     case MissionState::kReturn:
-      fly_home(inputs);
+      fly_to_landing(inputs);
       break;
     case MissionState::kLand:
       land(inputs);
@@ -164,8 +164,6 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
       waypoint_ = 0;
       break;
     case MissionState::kReturn:
-      request_ = {MotionRequest::Kind::kGoTo, config_.land_at_start ? home_O_ : *landing_O_};
-      events_(EventKind::kTargetSelected, describe(request_.goal_O));
       break;
     case MissionState::kExplore:
       break;  // hovers until the explorer's first word
@@ -193,8 +191,8 @@ void Mission::enter_area(const Inputs& inputs) {
   if (on_leg && !has_arrived(inputs)) {
     if (!leg_stalls(inputs)) return;
     drop_target(inputs.leg_blocked ? "entry: leg blocked" : "entry: leg not reached");
-    landing_O_ = home_O_;  // the way that it came is free
     enter(MissionState::kReturn, inputs);
+    go_home();  // the way that it came is free
     return;
   }
   if (on_leg) ++waypoint_;
@@ -213,7 +211,7 @@ void Mission::fly(const Inputs& inputs) {
   if (config_.kind == MissionConfig::Kind::kYawBurst) {
     spin(inputs);
   } else if (config_.waypoints_m.empty()) {
-    enter(MissionState::kLand, inputs);
+    land_as_told(inputs);
   } else if (planned ? inputs.progress == MotionProgress::kArrived : has_arrived(inputs)) {
     reach(inputs);
     next_waypoint(inputs);
@@ -235,7 +233,7 @@ void Mission::next_waypoint(const Inputs& inputs) {
   if (waypoint_ + 1 < config_.waypoints_m.size()) {
     select_waypoint(waypoint_ + 1, inputs.now);
   } else {
-    enter(MissionState::kLand, inputs);
+    land_as_told(inputs);
   }
 }
 
@@ -251,8 +249,7 @@ void Mission::select_waypoint(std::size_t index, Stamp now) {
 
 void Mission::explore(const Inputs& inputs) {
   if (stop_exploring_) {
-    const bool flies_there = config_.land_at_start || landing_O_;
-    enter(flies_there ? MissionState::kReturn : MissionState::kLand, inputs);
+    return_to_land(inputs);
     return;
   }
   // An explorer without a map says nothing.
@@ -283,28 +280,89 @@ void Mission::decide(const Decision& decision) {
                                                          : EventKind::kMissionState,
             "stop exploring: " + std::string(reason));
     stop_exploring_ = true;
-    landing_O_ = decision.landing_O;
-  } else if (decision.kind == DecisionKind::kNewTarget) {
+  } else if (decision.kind == DecisionKind::kNewTarget || decision.kind == DecisionKind::kGoBack) {
+    if (decision.kind == DecisionKind::kGoBack) {
+      events_(EventKind::kRecovery, "cut off from what it explored: back to where it flew");
+    }
     target_progress_ = TargetProgress::kUnderWay;
     request_ = {MotionRequest::Kind::kGoTo, decision.goal_O, 0, decision.sequence};
     events_(EventKind::kTargetSelected, describe(request_.goal_O));
   }
 }
 
-void Mission::fly_home(const Inputs& inputs) {
+void Mission::return_to_land(const Inputs& inputs) {
+  enter(MissionState::kReturn, inputs);
+  config_.land_at_start ? go_home() : void(landing_query_.emplace());
+}
+
+void Mission::go_home() {
+  request_ = {MotionRequest::Kind::kGoTo, home_O_};
+  events_(EventKind::kTargetSelected, describe(request_.goal_O));
+}
+
+void Mission::land_as_told(const Inputs& inputs) {
+  if (inputs.below != LandingGround::kObstructed) {
+    enter(MissionState::kLand, inputs);
+    return;
+  }
+  events_(EventKind::kRecovery, "not clear to land here: looks for a place");
+  enter(MissionState::kReturn, inputs);
+  landing_query_.emplace();
+}
+
+void Mission::answer(const std::optional<LandingPlace>& place) {
+  landing_query_.reset();
+  landing_ = place;
+  has_answer_ = true;
+}
+
+void Mission::fly_to_landing(const Inputs& inputs) {
+  if (landing_query_) return;
+  if (std::exchange(has_answer_, false)) {
+    if (!landing_ || landing_->kind == LandingPlace::Kind::kWidest) {
+      be_stuck("no_landing_place");
+    } else if (landing_->kind == LandingPlace::Kind::kToBeSeen) {
+      events_(EventKind::kRecovery, "no clear place to land is known: looks at one");
+    }
+    if (!landing_) {
+      enter(MissionState::kLand, inputs);
+      return;
+    }
+    request_ = {MotionRequest::Kind::kGoTo, landing_->p_O};
+    events_(EventKind::kTargetSelected, describe(request_.goal_O));
+    return;
+  }
   if (inputs.progress == MotionProgress::kArrived) {
     reach(inputs);
-    enter(MissionState::kLand, inputs);
+    const bool clear = !landing_ || landing_->kind == LandingPlace::Kind::kWidest ||
+                       inputs.below == LandingGround::kClear;
+    clear ? enter(MissionState::kLand, inputs) : try_another_landing(inputs);
   } else if (inputs.progress == MotionProgress::kFailed) {
-    events_(EventKind::kStuck, std::string(inputs.cause));
-    if (++returns_ < config_.return_tries) {
-      events_(EventKind::kRecovery, "another way home");
-      request_.attempt = returns_;
-    } else {
-      if (config_.land_at_start) stuck_ = inputs.cause;  // else here is as good
-      enter(MissionState::kLand, inputs);
-    }
+    fail_to_return(inputs);
   }
+}
+
+void Mission::fail_to_return(const Inputs& inputs) {
+  events_(EventKind::kStuck, std::string(inputs.cause));
+  if (!landing_ && ++returns_ < config_.return_tries) {
+    events_(EventKind::kRecovery, "another way home");
+    request_.attempt = returns_;
+    return;
+  }
+  if (!landing_ && stuck_.empty()) stuck_ = inputs.cause;
+  try_another_landing(inputs);
+}
+
+void Mission::try_another_landing(const Inputs& inputs) {
+  const bool was_last = landing_ && landing_->kind == LandingPlace::Kind::kWidest;
+  if (was_last) {
+    enter(MissionState::kLand, inputs);
+    return;
+  }
+  if (landing_) landings_tried_.push_back(landing_->p_O.head<2>());
+  events_(EventKind::kRecovery, "another place to land");
+  landing_query_ = {landings_tried_,
+                    static_cast<int>(landings_tried_.size()) >= config_.landing.tries};
 }
 
 // Each rate for a while, with as long a rest at zero rate after it.
@@ -312,7 +370,7 @@ void Mission::spin(const Inputs& inputs) {
   const Stamp phase = (inputs.now - state_since_) / from_seconds(config_.yaw_burst_s);
   const auto burst = static_cast<std::size_t>(phase / 2);
   if (burst >= config_.yaw_rates_radps.size()) {
-    enter(MissionState::kLand, inputs);
+    land_as_told(inputs);
     return;
   }
   const double rate = phase % 2 == 0 ? config_.yaw_rates_radps[burst] : 0.0;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exploration/explorer.h"
+#include "exploration/landing.h"
 #include "math/progress_watch.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
@@ -42,10 +43,11 @@ struct MissionConfig {
   double max_time_s = 600;
   std::vector<Vec3> entry_m;  ///< straight legs flown before exploring (garage: down the ramp)
   bool land_at_start = true;  ///< of an exploration; false: where it ends (garage)
-  int return_tries = 3;       ///< before it lands where it is
+  int return_tries = 3;       ///< before it lands at a clear place on the way
   std::vector<double> yaw_rates_radps{1, 2, 3};  ///< of a yaw burst, one after the other
   double yaw_burst_s = 4.0;                      ///< length of each
   double lost_hover_s = 1.0;  ///< without odometry: level at hover thrust, then down
+  LandingConfig landing;
 
   void fields(auto& f) {
     f("kind", kind, "what the vehicle is sent out to do");
@@ -68,11 +70,12 @@ struct MissionConfig {
     f("land_at_start", land_at_start,
       "an exploration keeps energy for the way home and lands there; false: it lands where it "
       "ends");
-    f("return_tries", return_tries, "failed ways home before it lands where it is");
+    f("return_tries", return_tries, "failed ways home before it lands at a clear place on the way");
     f("yaw_rates_radps", yaw_rates_radps, "of a yaw burst, one after the other");
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
     f("lost_hover_s", lost_hover_s,
       "level at hover thrust without odometry, then the autopilot lands");
+    f("landing", landing, "where it may come down");
     f.check(yaw_burst_s >= 0.001, "yaw_burst_s >= 0.001 (a tick)");
     f.check(lost_hover_s >= 0, "lost_hover_s >= 0");
     f.check(takeoff_height_m > 0, "takeoff_height_m > 0");
@@ -95,7 +98,7 @@ enum class MissionState {
   kEntry,  ///< legs into the area to explore
   kFly,    ///< waypoints, goals, yaw bursts
   kExplore,
-  kReturn,  ///< to the start, or to where it lands instead
+  kReturn,  ///< to the start, or to where it lands instead; hovers while it asks where that is
   kLand,
   kLost,
   kDone,
@@ -111,6 +114,12 @@ struct MissionTarget {
 
 /// The mission: a state machine from arming to disarming, driven by the odometry and the
 /// autopilot's word. It knows where to go, not how.
+///
+/// Where it lands. At the start, where it stood. At the last waypoint, unless the map knows that
+/// something stands there or that it is not flat. Everywhere else, and where those two fail, where
+/// LandingFinder says; a place that turns out not to be clear or cannot be flown to gives way to
+/// the next, landing.tries of them. If there is none, it comes down on the widest place that it
+/// can reach, or where it is if it reaches nothing, and says so: stuck, `no_landing_place`.
 class Mission {
  public:
   using EventSink = std::function<void(EventKind, const std::string& detail)>;
@@ -125,13 +134,19 @@ class Mission {
     bool armed = false;
     MotionProgress progress = MotionProgress::kUnderWay;  ///< of a kGoTo request
     std::string_view cause;                               ///< why it failed
-    bool leg_blocked = false;  ///< something stands in the way of a kLeg request
+    bool leg_blocked = false;                             ///< something stands in the way of a kLeg
+    LandingGround below = LandingGround::kUnknown;        ///< where it would come down
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);
 
   /// Takes the explorer's word while exploring.
   void decide(const Decision& decision);
+
+  /// It hovers until this is answered; none: it asks nothing.
+  [[nodiscard]] const std::optional<LandingQuery>& landing_query() const { return landing_query_; }
+  /// Answers the query; nothing if no place can be reached.
+  void answer(const std::optional<LandingPlace>& place);
 
   [[nodiscard]] const MotionRequest& request() const { return request_; }
   [[nodiscard]] MissionState state() const { return state_; }
@@ -155,7 +170,12 @@ class Mission {
   void begin_flying();
   void enter_area(const Inputs& inputs);
   void explore(const Inputs& inputs);
-  void fly_home(const Inputs& inputs);
+  void return_to_land(const Inputs& inputs);
+  void go_home();
+  void land_as_told(const Inputs& inputs);
+  void fly_to_landing(const Inputs& inputs);
+  void fail_to_return(const Inputs& inputs);
+  void try_another_landing(const Inputs& inputs);
   void reach(const Inputs& inputs);
   void next_waypoint(const Inputs& inputs);
   void fly(const Inputs& inputs);
@@ -178,8 +198,11 @@ class Mission {
   Vec3 home_O_ = Vec3::Zero();  ///< above the start, at take-off height
   TargetProgress target_progress_ = TargetProgress::kUnderWay;
   bool stop_exploring_ = false;
-  bool decided_ = false;           ///< the explorer has said something since the last step
-  std::optional<Vec3> landing_O_;  ///< of an exploration that does not land at the start
+  bool decided_ = false;  ///< the explorer has said something since the last step
+  std::optional<LandingQuery> landing_query_;
+  std::vector<Vec2> landings_tried_;
+  std::optional<LandingPlace> landing_;  ///< where it flies to land; none: home
+  bool has_answer_ = false;              ///< to the query, in landing_
   int returns_ = 0;
   std::string stuck_;
   Stamp lost_since_ = -1;  ///< -1: odometry is there

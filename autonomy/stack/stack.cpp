@@ -22,6 +22,8 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       explorer_lane_(jobs.add_lane("exploration")),
       mission_(config_.mission,
                [this](EventKind kind, const std::string& detail) { report(kind, detail); }),
+      landing_finder_(config_.mission.landing, config_.exploration.explorer,
+                      config_.vehicle.radius_m),
       legs_(config_.path, config_.caution),
       navigator_(config_.planning, config_.control.attitude_lag_s, jobs, seed),
       tracker_(config_.control, config_.vehicle),
@@ -126,11 +128,12 @@ std::optional<AttitudeCommand> Stack::tick() {
     report(EventKind::kMapFull, "mapping.cloud.max_points is reached, later points are left out");
   }
   decide();
+  seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
   request_ = mission_.update({now_, believed(), odometry_need(), autopilot_.ready, autopilot_.armed,
                               serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                              navigator_.cause(), !navigating_ && legs_.blocked()});
+                              navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
   setpoint_ = move(request_);
   return control(request_);
 }
@@ -141,7 +144,8 @@ void Stack::decide() {
   const bool told = progress != TargetProgress::kUnderWay;
   if (!jobs_.is_free(explorer_lane_, now_) || (now_ < next_decision_ && !told)) return;
   next_decision_ = now_ + from_seconds(1 / config_.exploration.decision_rate_hz);
-  ExplorerInput input{now_, odometry_.X_OB.p, Vec3::Zero(), progress, energy_};
+  ExplorerInput input{now_,     odometry_.X_OB.p, Vec3::Zero(),
+                      progress, energy_,          perception_.flown_since_map()};
   jobs_.start(explorer_lane_, now_, from_seconds(config_.exploration.latency_s),
               [this, input, map = perception_.map_2d()]() -> JobQueue::Delivery {
                 return [this, decision = explorer_.decide(*map, input)] {
@@ -149,6 +153,27 @@ void Stack::decide() {
                   decisions_.push_back(decision);
                 };
               });
+}
+
+void Stack::seek_landing() {
+  if (!mission_.landing_query() || !jobs_.is_free(explorer_lane_, now_)) return;
+  if (!perception_.map_2d()) {
+    mission_.answer(std::nullopt);
+    return;
+  }
+  jobs_.start(
+      explorer_lane_, now_, from_seconds(config_.exploration.latency_s),
+      [this, query = *mission_.landing_query(), p_OB = odometry_.X_OB.p, map = perception_.map_2d(),
+       flown = perception_.flown_since_map()]() -> JobQueue::Delivery {
+        return [this, place = landing_finder_.find(*map, p_OB, query, flown)] {
+          mission_.answer(place);
+        };
+      });
+}
+
+LandingGround Stack::ground_below() const {
+  const auto& map = perception_.map_2d();
+  return map ? landing_finder_.assess(*map, setpoint_.p_OB) : LandingGround::kUnknown;
 }
 
 TrajectorySetpoint Stack::move(const MotionRequest& request) {
@@ -172,7 +197,9 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
     if (event.kind == PlannerEventKind::kStateChanged || event.kind == PlannerEventKind::kPlanned) {
       continue;  // many a second
     }
-    report(EventKind::kPlanner,
+    const bool recovers =
+        event.kind == PlannerEventKind::kEscape || event.kind == PlannerEventKind::kBackOff;
+    report(recovers ? EventKind::kRecovery : EventKind::kPlanner,
            std::string(to_string(event.kind)) + " " + std::string(to_string(event.cause)));
   }
   return setpoint;

@@ -70,6 +70,8 @@ class Stack {
   [[nodiscard]] Odometry believed() const;
   [[nodiscard]] OdometryNeed odometry_need() const;
   void decide();
+  void seek_landing();
+  [[nodiscard]] LandingGround ground_below() const;
   TrajectorySetpoint move(const MotionRequest& request);
   AttitudeCommand control(const MotionRequest& request);
 
@@ -91,6 +93,7 @@ class Stack {
   JobQueue::Lane explorer_lane_;
   Stamp next_decision_ = 0;
   Mission mission_;
+  LandingFinder landing_finder_;
 
   MotionRequest request_;  ///< the newest
   LegMotion legs_;

@@ -227,7 +227,7 @@ std::vector<ColumnInfo> map_and_decision_columns() {
   return {
       {"decisions.csv", "time_s", "s", "of the decision"},
       {"decisions.csv", "decision", "", "its number"},
-      {"decisions.csv", "kind", "", "new_target, keep_target, stop or wait"},
+      {"decisions.csv", "kind", "", "new_target, keep_target, stop, wait or go_back"},
       {"decisions.csv", "source", "",
        "where its candidates come from: trees, exhaustive or forgiving"},
       {"decisions.csv", "previous_end", "", "how the target before it ended"},

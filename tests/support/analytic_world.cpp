@@ -74,6 +74,12 @@ AnalyticWorld AnalyticWorld::plain() {
   return world;
 }
 
+AnalyticWorld AnalyticWorld::parked_car() {
+  AnalyticWorld world = plain();
+  world.boxes_.push_back({{7.8, -0.9, -1}, {12.2, 0.9, world.ground_z_ + 1.5}, false});
+  return world;
+}
+
 double AnalyticWorld::ground(double x, double y) const {
   const double flat = std::min(1.0, std::hypot(x, y) / 2);  // level at the start
   return ground_z_ + flat * roughness_m_ *

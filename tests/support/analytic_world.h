@@ -20,6 +20,8 @@ class AnalyticWorld {
   static AnalyticWorld hall();
   /// Nothing but a flat ground: a vehicle above it cannot tell where it is.
   static AnalyticWorld plain();
+  /// The plain with a car parked on it, 4.4 x 1.8 x 1.5 m, its middle 10 m ahead of the start.
+  static AnalyticWorld parked_car();
 
   /// Distance along a unit direction, infinity for none; and the surface's unit normal.
   [[nodiscard]] double cast(const Vec3& origin, const Vec3& direction, Vec3& normal) const;

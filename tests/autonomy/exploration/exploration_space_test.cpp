@@ -6,6 +6,7 @@
 
 #include "autonomy/exploration/test_map.h"
 #include "exploration/frontier_search.h"
+#include "planning/guide_path.h"
 
 namespace arex {
 namespace {
@@ -256,28 +257,50 @@ TEST(ExplorationSpace, LeavesAPocketByTheWayThatItCame) {
   EXPECT_NEAR(space.travel_distance({20, 28}), 3.0, 1e-9);
 }
 
-TEST(ExplorationSpace, TheNearestClearingIsThatOfBruteForce) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    RandomStream random(seed, "clearing");
-    const OccupancyMap2D map = test::random_map(70, 50, random);
-    const ExplorationSpace space(map, wide(), {}, random_in(map, random));
-    for (const double clearance : {0.0, 0.6, 1.0, 9.0}) {
-      double best = ExplorationSpace::kUnreachable;
-      for (int y = 0; y < map.height; ++y) {
-        for (int x = 0; x < map.width; ++x) {
-          if (map.at({x, y}) != OccupancyMap2D::kFree) continue;
-          if (space.clearance({x, y}) < clearance) continue;
-          best = std::min(best, space.travel_distance({x, y}));
-        }
-      }
-      const auto found = space.nearest_clearing(clearance);
-      ASSERT_EQ(found.has_value(), best < ExplorationSpace::kUnreachable);
-      if (!found) continue;
-      EXPECT_EQ(space.travel_distance(map.cell_of(*found)), best);
-      EXPECT_GE(space.clearance(map.cell_of(*found)), clearance);
-      EXPECT_TRUE(space.is_free(map.cell_of(*found)));
+TEST(ExplorationSpace, KnowsThatItIsCutOffFromWhereItFlew) {
+  // The map is older than the last metre that was flown: over a bonnet, into a gap.
+  OccupancyMap2D map = test::make_map(60, 60, OccupancyMap2D::kFree);
+  test::fill(map, {30, 0}, {59, 59}, OccupancyMap2D::kOccupied);
+  test::fill(map, {44, 22}, {56, 34}, OccupancyMap2D::kFree);  // clear, but closed all around
+  const Vec2 robot = map.centre_of({50, 28});
+  std::vector<std::uint32_t> since;
+  for (int x = 20; x <= 50; ++x) {
+    (x <= 38 ? map.flown : since).push_back(static_cast<std::uint32_t>(map.index({x, 28})));
+  }
+  const ExplorationSpace stale(map, wide(), {}, robot);
+  EXPECT_TRUE(stale.has_start());
+  EXPECT_FALSE(stale.reaches_flown());
+  EXPECT_FALSE(stale.is_reachable({10, 30}));
+  const ExplorationSpace space(map, wide(), {}, robot, since);
+  EXPECT_TRUE(space.reaches_flown());
+  EXPECT_TRUE(space.is_reachable({10, 30}));
+}
+
+TEST(ExplorationSpace, TheGuideLeadsWhereverItReaches) {
+  int narrow = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    RandomStream random(seed, "agree");
+    OccupancyMap2D map = test::random_map(120, 90, random);
+    // A wall with a gap as wide as the explorer takes the vehicle for, or one flown through.
+    test::fill(map, {60, 0}, {60, 89}, OccupancyMap2D::kOccupied);
+    test::fill(map, {50, 35}, {70, 57}, OccupancyMap2D::kFree);
+    test::fill(map, {60, 0}, {60, 89}, OccupancyMap2D::kOccupied);
+    const bool flown = seed % 2 == 0;
+    if (!flown) test::fill(map, {60, 42}, {60, 50}, OccupancyMap2D::kFree);  // 9 cells
+    for (int x = 50; flown && x <= 70; ++x) {
+      map.flown.push_back(static_cast<std::uint32_t>(map.index({x, 46})));
+    }
+    const Eigen::Vector2i start(52, 46);
+    const ExplorationSpace space(map, wide(), {}, map.centre_of(start));
+    for (int k = 0; k < 60; ++k) {
+      const Vec2 goal = random_in(map, random);
+      if (!space.is_reachable(map.cell_of(goal))) continue;
+      narrow += map.cell_of(goal).x() > 60;
+      const GuidePath guide = plan_guide(map, map.centre_of(start), goal, {});
+      ASSERT_EQ(guide.status, GuideStatus::kFound) << "seed " << seed;
     }
   }
+  EXPECT_GT(narrow, 50);
 }
 
 TEST(ExplorationSpace, AWayThatLeadsNowhereClearIsNoStart) {

@@ -290,20 +290,53 @@ TEST(Explorer, WaitsWhileItKnowsNothing) {
   EXPECT_EQ(explorer.decide(map, ExplorerInput{}).kind, DecisionKind::kWait);
 }
 
-TEST(Explorer, NamesAClearingToLandOnWhereItDoesNotComeHome) {
-  for (const bool home : {true, false}) {
-    Hall hall;
-    test::fill(hall.map, {150, 1}, {198, 78}, OccupancyMap2D::kFree);
-    hall.config.stop.return_home = home;
-    hall.input.p_OB = {-9.4, 0.2, 1.5};  // half a metre from the wall
-    const Decision d = Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
-    ASSERT_EQ(d.kind, DecisionKind::kStop);
-    EXPECT_EQ(d.landing_O.has_value(), !home);
-    if (!d.landing_O) continue;
-    EXPECT_NEAR(d.landing_O->x(), -10 + 0.05 + hall.config.stop.landing_clearance_m, 0.051);
-    EXPECT_NEAR(d.landing_O->y(), 0.2, 0.051);
-    EXPECT_EQ(d.landing_O->z(), hall.config.flight_height_m);
+/// A hall with an unknown end, and a chamber beside it that the vehicle is in: what it came through
+/// has closed in the map.
+struct Pocket : Hall {
+  Pocket() {
+    test::fill(map, {20, 1}, {60, 78}, OccupancyMap2D::kOccupied);
+    test::fill(map, {30, 30}, {50, 50}, OccupancyMap2D::kFree);
+    for (int x = 55; x <= 80; ++x) {
+      map.flown.push_back(static_cast<std::uint32_t>(map.index({135 - x, 40})));
+      map.flown_height_m.push_back(2.0F);
+    }
+    input.p_OB = {map.centre_of({40, 40}).x(), map.centre_of({40, 40}).y(), 1.5};
   }
+};
+
+TEST(Explorer, BelievesThatNothingIsLeftOnlyWhereItReachesWhatItFlew) {
+  Pocket pocket;
+  Explorer explorer(pocket.config, 0.1, 1);
+  const Decision d = explorer.decide(pocket.map, pocket.input);
+  ASSERT_EQ(d.kind, DecisionKind::kGoBack);
+  // To the nearest place that it flew through, as high as it was there.
+  EXPECT_LT((d.goal_O - Vec3(pocket.map.centre_of({55, 40}).x(), 0.05, 2.0)).norm(), 1e-6);
+  EXPECT_EQ(explorer.decide(pocket.map, pocket.input).kind, DecisionKind::kKeepTarget);
+  pocket.input.p_OB = d.goal_O;
+  pocket.input.progress = TargetProgress::kReached;
+  EXPECT_EQ(explorer.decide(pocket.map, pocket.input).kind, DecisionKind::kNewTarget);
+}
+
+TEST(Explorer, GivesUpTheWayBackInTheEnd) {
+  Pocket pocket;
+  Explorer explorer(pocket.config, 0.1, 1);
+  int tries = 0;
+  Decision d = explorer.decide(pocket.map, pocket.input);
+  for (; d.kind == DecisionKind::kGoBack && tries < 10; ++tries) {
+    pocket.input.progress = TargetProgress::kUnreachable;
+    d = explorer.decide(pocket.map, pocket.input);
+  }
+  EXPECT_EQ(tries, 3);
+  EXPECT_EQ(d.kind, DecisionKind::kStop);
+}
+
+TEST(Explorer, KnowsTheWayThatItFlewSinceTheMapWasMade) {
+  Pocket pocket;
+  for (int x = 40; x < 55; ++x) {
+    pocket.input.flown_since.push_back(static_cast<std::uint32_t>(pocket.map.index({x, 40})));
+  }
+  const Decision d = Explorer(pocket.config, 0.1, 1).decide(pocket.map, pocket.input);
+  EXPECT_EQ(d.kind, DecisionKind::kNewTarget);
 }
 
 TEST(Explorer, FliesAtItsHeightAboveTheGroundOfTheGoal) {

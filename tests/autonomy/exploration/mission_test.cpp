@@ -15,6 +15,7 @@ class Pilot {
   explicit Pilot(const MissionConfig& config)
       : mission(config, [this](EventKind kind, const std::string& detail) {
           if (kind == EventKind::kMissionState) states.push_back(detail);
+          if (kind == EventKind::kRecovery || kind == EventKind::kStuck) troubles.push_back(detail);
         }) {}
 
   /// Obeys for so many seconds, 50 steps a second.
@@ -33,6 +34,12 @@ class Pilot {
     const bool navigates = served == request && request.kind == MotionRequest::Kind::kGoTo;
     inputs.progress = navigates ? progress : MotionProgress::kUnderWay;
     inputs.cause = "no_path";
+    inputs.below = below;
+    if (mission.landing_query()) {
+      queries.push_back(*mission.landing_query());
+      mission.answer(places.empty() ? std::nullopt : std::optional(places.front()));
+      if (!places.empty()) places.erase(places.begin());
+    }
     request = mission.update(inputs);
     served = request;
     armed = request.kind != MotionRequest::Kind::kNone;
@@ -52,7 +59,10 @@ class Pilot {
   MotionRequest request, served;
   MotionProgress progress = MotionProgress::kArrived;
   Vec2 landed_at = Vec2::Constant(1e9);
-  std::vector<std::string> states;
+  LandingGround below = LandingGround::kClear;  ///< where it would come down
+  std::vector<LandingPlace> places;             ///< answers, in order
+  std::vector<LandingQuery> queries;
+  std::vector<std::string> states, troubles;
   Mission mission;
 };
 
@@ -72,11 +82,10 @@ Decision target(const Vec3& goal_O, int sequence) {
   return decision;
 }
 
-Decision stop(std::optional<Vec3> landing_O) {
+Decision stop() {
   Decision decision;
   decision.kind = DecisionKind::kStop;
   decision.stop_reason = StopReason::kNoCandidates;
-  decision.landing_O = landing_O;
   return decision;
 }
 
@@ -93,7 +102,7 @@ void explore(Pilot& pilot, const Decision& last) {
 
 TEST(Mission, ComesHomeToLand) {
   Pilot pilot(exploration(true));
-  explore(pilot, stop(std::nullopt));
+  explore(pilot, stop());
   pilot.fly(2);
   EXPECT_EQ(pilot.landed_at, Vec2(0, 0));
   EXPECT_EQ(pilot.states,
@@ -102,38 +111,96 @@ TEST(Mission, ComesHomeToLand) {
   EXPECT_TRUE(pilot.mission.stuck().empty());
 }
 
-TEST(Mission, LandsOnTheClearingThatTheExplorerNames) {
+using PlaceKind = LandingPlace::Kind;
+
+TEST(Mission, LandsOnTheClearPlaceThatTheMapNames) {
   Pilot pilot(exploration(false));
-  explore(pilot, stop(Vec3(22, 4, 1.5)));
+  pilot.places = {{PlaceKind::kClear, {22, 4, 1.5}}};
+  explore(pilot, stop());
   pilot.fly(2);
   EXPECT_EQ(pilot.landed_at, Vec2(22, 4));
   EXPECT_EQ(pilot.mission.state(), MissionState::kDone);
   EXPECT_EQ(pilot.mission.targets().back().p_O, Vec3(22, 4, 1.5));
+  EXPECT_TRUE(pilot.mission.stuck().empty());
 }
 
-TEST(Mission, LandsWhereItIsWithoutAClearing) {
+TEST(Mission, FliesOnWhereAPlaceTurnsOutNotToBeClear) {
   Pilot pilot(exploration(false));
-  explore(pilot, stop(std::nullopt));
+  pilot.places = {{PlaceKind::kToBeSeen, {22, 4, 1.5}}, {PlaceKind::kClear, {30, 4, 1.5}}};
+  pilot.below = LandingGround::kObstructed;
+  explore(pilot, stop());
+  while (pilot.queries.size() < 2 && pilot.now < from_seconds(60)) pilot.step();
+  pilot.below = LandingGround::kClear;
   pilot.fly(2);
-  EXPECT_EQ(pilot.landed_at, Vec2(20, 3));
-  EXPECT_EQ(std::count(pilot.states.begin(), pilot.states.end(), "return"), 0);
+  EXPECT_EQ(pilot.landed_at, Vec2(30, 4));
+  ASSERT_EQ(pilot.queries.size(), 2u);
+  EXPECT_EQ(pilot.queries[1].tried, std::vector<Vec2>{Vec2(22, 4)});
+  EXPECT_TRUE(pilot.mission.stuck().empty());
 }
 
-TEST(Mission, LandsWhereItIsWhenNoWayLeadsThere) {
-  for (const bool home : {true, false}) {
-    MissionConfig config = exploration(home);
-    config.return_tries = 3;
-    Pilot pilot(config);
-    explore(pilot, stop(Vec3(22, 4, 1.5)));
-    pilot.progress = MotionProgress::kFailed;
-    pilot.step();  // asks for the way
-    for (int attempt = 1; attempt < config.return_tries; ++attempt) {
-      pilot.step();
-      EXPECT_EQ(pilot.request.attempt, attempt);
+TEST(Mission, SaysThatThereIsNoPlaceToLandAndTakesTheWidest) {
+  for (const bool any : {true, false}) {
+    Pilot pilot(exploration(false));
+    if (any) pilot.places = {{PlaceKind::kWidest, {22, 4, 1.5}}};
+    pilot.below = LandingGround::kObstructed;
+    explore(pilot, stop());
+    pilot.fly(2);
+    EXPECT_EQ(pilot.landed_at, any ? Vec2(22, 4) : Vec2(20, 3));
+    EXPECT_EQ(pilot.mission.stuck(), "no_landing_place");
+  }
+}
+
+TEST(Mission, LandsAtAClearPlaceWhenNoWayLeadsHome) {
+  MissionConfig config = exploration(true);
+  config.return_tries = 3;
+  Pilot pilot(config);
+  pilot.places = {{PlaceKind::kClear, {22, 4, 1.5}}};
+  explore(pilot, stop());
+  pilot.progress = MotionProgress::kFailed;
+  pilot.step();  // asks for the way
+  for (int attempt = 1; attempt < config.return_tries; ++attempt) {
+    pilot.step();
+    EXPECT_EQ(pilot.request.attempt, attempt);
+  }
+  pilot.step();
+  pilot.progress = MotionProgress::kArrived;
+  pilot.fly(1);
+  EXPECT_EQ(pilot.landed_at, Vec2(22, 4));
+  EXPECT_EQ(pilot.mission.stuck(), "no_path");  // home was asked for
+}
+
+TEST(Mission, TriesSoManyPlacesToLandAndThenTheWidest) {
+  MissionConfig config = exploration(false);
+  config.landing.tries = 3;
+  Pilot pilot(config);
+  for (int k = 0; k < 3; ++k) pilot.places.push_back({PlaceKind::kClear, {22.0 + 2 * k, 4, 1.5}});
+  explore(pilot, stop());
+  pilot.progress = MotionProgress::kFailed;
+  pilot.fly(2);
+  ASSERT_EQ(pilot.queries.size(), 4u);
+  EXPECT_FALSE(pilot.queries[2].last_resort);
+  EXPECT_TRUE(pilot.queries[3].last_resort);
+  EXPECT_EQ(pilot.queries[3].tried.size(), 3u);
+  EXPECT_EQ(pilot.mission.stuck(), "no_landing_place");
+}
+
+TEST(Mission, LandsWhereToldUnlessTheMapKnowsThatSomethingStandsThere) {
+  for (const auto kind : {MissionConfig::Kind::kWaypoints, MissionConfig::Kind::kGoals}) {
+    for (const auto below :
+         {LandingGround::kClear, LandingGround::kUnknown, LandingGround::kObstructed}) {
+      MissionConfig config;
+      config.kind = kind;
+      config.waypoints_m = {{5, 0, 1.5}, {9, 0, 1.5}};
+      Pilot pilot(config);
+      pilot.places = {{PlaceKind::kClear, {9, 3, 1.5}}};
+      pilot.below = below;
+      while (pilot.queries.empty() && pilot.now < from_seconds(30)) pilot.step();
+      pilot.below = LandingGround::kClear;
+      pilot.fly(2);
+      const bool moved = below == LandingGround::kObstructed;
+      EXPECT_EQ(pilot.landed_at, moved ? Vec2(9, 3) : Vec2(9, 0));
+      EXPECT_EQ(pilot.troubles.empty(), !moved);  // it says so
     }
-    pilot.fly(1);
-    EXPECT_EQ(pilot.landed_at, Vec2(20, 3));
-    EXPECT_EQ(pilot.mission.stuck(), home ? "no_path" : "");  // only home was asked for
   }
 }
 

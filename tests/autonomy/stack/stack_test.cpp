@@ -11,11 +11,13 @@ namespace {
 constexpr Stamp kTick = kNanosecondsPerTick;
 constexpr Stamp kFrame = 100 * kTick;
 
-/// The flight software on mocap in the hall: its vehicle is where the setpoint is, and its sensors
-/// tell what the test wants.
+/// The flight software on mocap, in the hall or elsewhere: its vehicle is where the setpoint is,
+/// and its sensors tell what the test wants.
 class HallFlight {
  public:
-  explicit HallFlight(const StackConfig& config) : stack_(config, jobs_, 1) {}
+  explicit HallFlight(const StackConfig& config,
+                      test::AnalyticWorld world = test::AnalyticWorld::hall())
+      : stack_(config, jobs_, 1), world_(std::move(world)) {}
 
   /// Flies on; `X_OO` is what the odometry's frame has slipped by: estimates are X_OO times true.
   void run(double seconds, const Pose& X_OO = {}) {
@@ -33,8 +35,8 @@ class HallFlight {
       if (now_ % kFrame == 0 && now_ > 0) {
         const test::AnalyticMotion still{{(Vec4() << X_.p, so3::yaw(X_.R)).finished()}, 1, 1000};
         stack_.add_scan(std::make_shared<LidarScan>(
-            test::simulate_scan(test::AnalyticWorld::hall(), still, VehicleConfig{}.X_BL(),
-                                now_ - kFrame, test::SensorNoise::none(), 1, 8)));
+            test::simulate_scan(world_, still, VehicleConfig{}.X_BL(), now_ - kFrame,
+                                test::SensorNoise::none(), 1, 8)));
       }
       jobs_.advance(now_);
       const TrajectorySetpoint before = stack_.setpoint();
@@ -46,6 +48,7 @@ class HallFlight {
 
   JobQueue jobs_{1};
   Stack stack_;
+  test::AnalyticWorld world_;
   Stamp now_ = 0;
   Pose X_;  ///< of the vehicle in the true O
   double largest_step_m_ = 0;
@@ -99,6 +102,27 @@ TEST(Stack, AStepSmallerThanTheMapsMarginChangesNothing) {
   const auto grid = flight.stack_.perception().grid();
   flight.run(0.02, {Mat3::Identity(), {0.1, 0, 0}});
   EXPECT_EQ(flight.stack_.perception().grid(), grid);
+}
+
+// The last waypoint is above a car: it says so, and flies on to where the ground is free.
+TEST(Stack, LandsBesideNotOnWhatStandsBelowItsLastWaypoint) {
+  for (const auto kind : {MissionConfig::Kind::kGoals, MissionConfig::Kind::kWaypoints}) {
+    StackConfig config = goals({{4, 5, 1.5}, {4, -5, 1.5}, {10, 0, 2.5}});
+    config.mission.kind = kind;
+    config.mission.takeoff_height_m = 2.5;
+    HallFlight flight(config, test::AnalyticWorld::parked_car());
+    while (flight.stack_.mission().state() != MissionState::kLand &&
+           flight.now_ < from_seconds(90)) {
+      flight.run(0.1);
+    }
+    ASSERT_EQ(flight.stack_.mission().state(), MissionState::kLand);
+    EXPECT_EQ(flight.stack_.mission().stuck(), "");
+    const Vec2 off =
+        ((flight.X_.p.head<2>() - Vec2(10, 0)).cwiseAbs() - Vec2(2.2, 0.9)).cwiseMax(0);
+    EXPECT_GT(off.norm(), 0.6);  // the vehicle and its margin
+    EXPECT_NE(events_of(flight.stack_, EventKind::kRecovery).find("not clear to land"),
+              std::string::npos);
+  }
 }
 
 TEST(Stack, NamesASourceThatHasFallenSilentBeforeTakeOff) {

@@ -35,6 +35,9 @@ void expect_explored(const FlightResult& result, double area_fraction, double su
   // It stopped because nothing larger than the threshold was left that it could reach.
   EXPECT_NE(result.exploration.stop_reason, StopReason::kBattery);
   EXPECT_LT(result.exploration.open_frontier_m2.value(), StopConfig{}.min_area_m2);
+  ASSERT_TRUE(result.flight.landing.has_value());
+  EXPECT_TRUE(result.flight.landing->on_floor);
+  EXPECT_GT(result.flight.landing->clearance_m, LandingConfig{}.margin_m);
 }
 
 TEST(Explore, ASmallForestIsExploredAndTheVehicleComesHome) {

@@ -33,9 +33,12 @@ target_compile_options(arex_options INTERFACE
   # GCC 12 sees phantom overruns, overlaps and uninitialised reads in Eigen's vectorised assignments
   # and where a string is put behind a char pointer.
   -Wno-array-bounds -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-restrict
-  $<$<BOOL:${AREX_WERROR}>:-Werror>
-  $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)
-target_link_options(arex_options INTERFACE $<$<BOOL:${AREX_SANITIZE}>:-fsanitize=address,undefined>)
+  $<$<BOOL:${AREX_WERROR}>:-Werror>)
+if(AREX_SANITIZE)
+  target_compile_options(arex_options INTERFACE
+    -fsanitize=${AREX_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(arex_options INTERFACE -fsanitize=${AREX_SANITIZE})
+endif()
 target_compile_definitions(arex_options INTERFACE
   EIGEN_MAX_ALIGN_BYTES=16
   $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN>)

@@ -16,6 +16,7 @@
 #include "sensors/d430.h"
 #include "sensors/imu.h"
 #include "sensors/mid360.h"
+#include "sensors/mocap.h"
 #include "stack/stack.h"
 #include "worlds/recipes.h"
 
@@ -64,6 +65,7 @@ struct ScenarioConfig {
   ImuConfig imu;
   Mid360Config lidar;
   D430Config depth;
+  MocapConfig mocap;
   DeviceConfig devices;
   AutopilotConfig autopilot;
   StackConfig stack;
@@ -76,6 +78,7 @@ struct ScenarioConfig {
     f("imu", imu, "the autopilot's sensors");
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
+    f("mocap", mocap, "motion capture, where odometry.source is that");
     f("devices", devices, "which run, and how long they take");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);

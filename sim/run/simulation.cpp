@@ -181,8 +181,7 @@ void Simulation::fire_imu() {
     stack_.add_battery(sample);
     imu_hash_.add(std::array{sample.voltage_v, sample.current_a});
     if (config_.stack.odometry.source == OdometryConfig::Source::kMocap) {
-      const Pose X_OW = scorer_.X_WO().inverse();
-      stack_.add_mocap({now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB});
+      stack_.add_mocap(sample_mocap(config_.mocap, now_, scorer_.X_WO().inverse(), truth));
     }
   }
 }

@@ -180,6 +180,9 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
   if (request.kind != MotionRequest::Kind::kGoTo) {
     if (navigating_) legs_.take_over(setpoint_);
     navigating_ = false;
+    // The legs into an area lead down ramps and through doors by heights that its 2D map has not.
+    const bool in_area = config_.mission.kind != MissionConfig::Kind::kExplore;
+    if (in_area && !autopilot_.landed) perception_.note_flown(odometry_.X_OB.p);
     if (perception_.grid()) {
       legs_.look_ahead(perception_.grid()->view, config_.vehicle.radius_m);
     }

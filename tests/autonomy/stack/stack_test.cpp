@@ -107,6 +107,7 @@ TEST(Stack, AStepSmallerThanTheMapsMarginChangesNothing) {
 // The last waypoint is above a car: it says so, and flies on to where the ground is free.
 TEST(Stack, LandsBesideNotOnWhatStandsBelowItsLastWaypoint) {
   for (const auto kind : {MissionConfig::Kind::kGoals, MissionConfig::Kind::kWaypoints}) {
+    SCOPED_TRACE(static_cast<int>(kind));
     StackConfig config = goals({{4, 5, 1.5}, {4, -5, 1.5}, {10, 0, 2.5}});
     config.mission.kind = kind;
     config.mission.takeoff_height_m = 2.5;

@@ -169,7 +169,10 @@ export class FlightScene {
     this.heights = cloud.z.length ? [percentile(cloud.z, 0.001), percentile(cloud.z, 0.999)] : [0, 1];
     const track = data.truth ?? data.estimate;
     const level = track ? percentile(track.z, 0.5) : 0;
-    this.firstCut = track && ceilingOver(cloud, track, level) ? level + 0.5 : null;
+    // Under a ceiling or in a wood, whatever is above the flight hides it.
+    const above = cloud.z.reduce((count, z) => count + Number(z > level + 1.5), 0);
+    this.firstCut = track && ceilingOver(cloud, track, level) ? level + 0.5
+      : track && above > 0.15 * cloud.z.length ? level + 1.5 : null;
     this.addCloud();
     for (const [name, width] of [['truth', 3], ['estimate', 2.5]] as const) {
       const path = data[name];
@@ -200,14 +203,34 @@ export class FlightScene {
       return [Math.min(...ends), Math.max(...ends)];
     });
     if (!Number.isFinite(axes[0][0])) return;
-    const centre = new Vector3(...axes.map(([low, high]) => (low + high) / 2));
-    const diagonal = Math.hypot(...axes.map(([low, high]) => high - low));
-    // A narrow view needs more room.
-    const reach = (0.5 * Math.max(10, diagonal)) / Math.min(1, this.camera.aspect);
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).add(new Vector3(-0.45, -0.95, 1.0).multiplyScalar(reach));
+    if (this.firstCut !== null) axes[2][1] = Math.max(axes[2][0], Math.min(axes[2][1], this.firstCut));
+    this.fit(axes, new Vector3(-0.45, -0.95, 1.0).normalize());
     this.controls.update();
     this.ask();
+  }
+
+  /** Places the camera in a direction so that a box just fills the view. */
+  private fit(axes: number[][], towardsCamera: Vector3): void {
+    const centre = new Vector3(...axes.map(([low, high]) => (low + high) / 2));
+    const forward = towardsCamera.clone().negate();
+    const right = forward.clone().cross(this.camera.up).normalize();
+    const up = right.clone().cross(forward);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
+      new Vector3(axes[0][i & 1], axes[1][(i >> 1) & 1], axes[2][(i >> 2) & 1]).sub(centre));
+    // A corner at depth z in front of the centre is inside while |offset| <= (distance + z) slope.
+    const tangent = Math.tan((this.camera.fov * Math.PI) / 360);
+    const along = (axis: Vector3, slope: number) => {
+      const ends = corners.map((c) => [c.dot(axis), slope * c.dot(forward)]);
+      const high = Math.max(...ends.map(([offset, depth]) => offset - depth));
+      const low = Math.min(...ends.map(([offset, depth]) => offset + depth));
+      return { shift: (high + low) / 2, distance: (high - low) / (2 * slope) };
+    };
+    const across = along(right, tangent * this.camera.aspect);
+    const upwards = along(up, tangent);
+    const distance = 1.05 * Math.max(5, across.distance, upwards.distance);
+    const target = centre.addScaledVector(right, across.shift).addScaledVector(up, upwards.shift);
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(towardsCamera, distance);
   }
 
   show(layer: Layer, visible: boolean): void {

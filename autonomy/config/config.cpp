@@ -321,6 +321,21 @@ void expect_length(const ConfigNode& node, std::string_view key, std::size_t len
   }
 }
 
+const ConfigNode* find_dotted(const ConfigNode& root, std::string_view dotted_key) {
+  const ConfigNode::Entry* entry = find_entry(root, dotted_key);
+  return entry ? &entry->value : nullptr;
+}
+
+void expect_name(const ConfigNode::Entry& entry) {
+  constexpr std::size_t kLongest = 40;
+  const bool plain = std::all_of(entry.key.begin(), entry.key.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  });
+  if (plain && !entry.key.empty() && entry.key.size() <= kLongest) return;
+  fail(entry.where, "the name '" + shortened(entry.key) +
+                        "', expected at most 40 letters, digits and underscores");
+}
+
 void parse_scalar(const ConfigNode& node, std::string_view key, bool& out) {
   constexpr std::string_view kExpected = "true or false";
   expect_kind(node, key, ConfigNode::Kind::kScalar, kExpected);

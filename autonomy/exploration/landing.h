@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "exploration/explorer.h"
+#include "exploration/frontier_explorer.h"
 
 namespace arex {
 

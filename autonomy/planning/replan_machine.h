@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "mapping/grid_view.h"
 #include "math/progress_watch.h"
 #include "messages/estimates.h"
-#include "planning/local_planner.h"
+#include "planning/bspline_planner.h"
 #include "planning/yaw_planner.h"
 
 namespace arex {
@@ -114,8 +115,10 @@ struct PlannerEvent {
 /// while no plan leads even back there; another target (needs_target() with the cause).
 class ReplanMachine {
  public:
+  /// @param other whose trajectories it flies; null: the B-spline planner's own, which escapes and
+  ///   stops in any case
   ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner, const YawConfig& yaw,
-                std::uint64_t seed);
+                std::uint64_t seed, std::unique_ptr<LocalPlanner> other = nullptr);
 
   /// Takes the vehicle over at rest at a setpoint of somebody else's.
   void start_at(const Vec3& p_OB, double yaw_rad, Stamp now);
@@ -127,7 +130,6 @@ class ReplanMachine {
     guide_ = std::move(guide);
     new_guide_ = true;
   }
-  void clear_target(Stamp now);
   /// Gives the target up: another one is needed.
   void give_up(StuckCause cause, Stamp now);
   /// Gives it up where the vehicle gets no nearer to it. tick() asks this, too.
@@ -149,10 +151,7 @@ class ReplanMachine {
   /// The trajectory in force and when it began.
   [[nodiscard]] const UniformBspline& trajectory() const { return current_.spline; }
   [[nodiscard]] Stamp trajectory_start() const { return current_.start; }
-  /// Diagnostics of the newest plan.
-  [[nodiscard]] const PlanResult& last_plan() const { return last_plan_; }
-  [[nodiscard]] int plans() const { return plans_; }
-  [[nodiscard]] int failures() const { return failures_; }
+  [[nodiscard]] const PlanCounts& counts() const { return counts_; }
   /// Events since the last call.
   [[nodiscard]] std::vector<PlannerEvent> take_events();
 
@@ -194,7 +193,8 @@ class ReplanMachine {
   [[nodiscard]] bool must_replan_for_space(const GridView& grid, Stamp now) const;
 
   ReplanConfig config_;
-  LocalPlanner planner_;
+  std::unique_ptr<LocalPlanner> planner_;
+  BsplinePlanner bspline_;
   YawPlanner yaw_planner_;
   std::uint64_t seed_;
 
@@ -218,8 +218,7 @@ class ReplanMachine {
   Heading heading_;
   Stamp last_setpoint_ = 0;
 
-  int plans_ = 0;
-  int failures_ = 0;
+  PlanCounts counts_;
   PlanResult last_plan_;
   std::vector<PlannerEvent> events_;
 };

@@ -2,13 +2,14 @@
 #include <cstdio>
 
 #include "app/commands.h"
+#include "app/host.h"
 #include "run/scenario.h"
 
 namespace arex::app {
 namespace {
 
 sim::Scenario load(const ScenarioArguments& arguments) {
-  return sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+  return sim::load_scenario(or_shipped(arguments.file), arguments.overrides, arguments.seed);
 }
 
 }  // namespace

@@ -54,11 +54,11 @@ class ProgressLine {
     if (wall < next_) return;
     next_ = wall + (on_terminal_ ? 0.25 : 10.0);  // a log wants a line now and then
     const double time = to_seconds(simulation.now());
-    const Mission& mission = simulation.stack().mission();
-    const auto state = kMissionStateNames[static_cast<std::size_t>(mission.state())];
+    const FlightView view = simulation.view();
+    const auto state = kMissionStateNames[static_cast<std::size_t>(view.state)];
     if (on_terminal_) std::fputc('\r', stderr);
     std::fprintf(stderr, "%7.1f s  %-10.*s  targets %2zu  explored %3.0f %%  %5.2fx real time ",
-                 time, static_cast<int>(state.size()), state.data(), mission.targets().size(),
+                 time, static_cast<int>(state.size()), state.data(), view.targets.size(),
                  100 * simulation.area_fraction(), time / wall);
     if (!on_terminal_) std::fputc('\n', stderr);
     drawn_ = true;
@@ -219,8 +219,8 @@ int run(const RunArguments& arguments) {
   const double cpu_begin = cpu_seconds();
   const Interrupts interrupts;
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the progress may leave: the flight goes on
-  sim::Scenario scenario = sim::load_scenario(arguments.scenario.file, arguments.scenario.overrides,
-                                              arguments.scenario.seed);
+  sim::Scenario scenario = sim::load_scenario(
+      or_shipped(arguments.scenario.file), arguments.scenario.overrides, arguments.scenario.seed);
   scenario.name = printable(arguments.name.empty() ? scenario.name : arguments.name);
   const std::vector<sim::Requirement> requirements = parse_requirements(arguments);
   const std::unique_ptr<sim::RunFolder> folder = claim_folder(arguments, scenario);

@@ -262,7 +262,7 @@ std::size_t array_size_of_cluster() {
 
 int sweep(const SweepArguments& arguments) {
   const sim::SweepPlan plan =
-      sim::expand(sim::load_sweep_file(arguments.file), sim::fingerprint(kSelf));
+      sim::expand(sim::load_sweep_file(or_shipped(arguments.file)), sim::fingerprint(kSelf));
   if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 

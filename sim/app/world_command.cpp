@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "app/commands.h"
+#include "app/host.h"
 #include "run/file_io.h"
 #include "run/scenario.h"
 #include "worlds/export.h"
@@ -57,12 +58,12 @@ void expect_no_run(const std::filesystem::path& folder) {
 }  // namespace
 
 int world(const WorldArguments& arguments) {
-  ConfigNode root = load_yaml(arguments.file);
+  ConfigNode root = load_yaml(or_shipped(arguments.file));
   for (const std::string& assignment : arguments.overrides) apply_override(root, assignment);
   RecipeConfig recipe;
   if (root.find("world")) {
     const sim::Scenario scenario =
-        sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+        sim::load_scenario(or_shipped(arguments.file), arguments.overrides, arguments.seed);
     recipe.world = scenario.config.world;
     recipe.seed = scenario.config.seed;
   } else {

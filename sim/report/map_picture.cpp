@@ -126,14 +126,14 @@ std::string format(const char* pattern, Numbers... numbers) {
   return text.data();
 }
 
-std::string polyline(const std::vector<StampedPose>& poses, const char* name) {
+std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
   if (poses.empty()) return {};
   std::string points;
   const std::size_t step = poses.size() / kMaxPath + 1;
   for (std::size_t i = 0; i < poses.size(); i += step) {
-    points += format("%.2f,%.2f ", poses[i].X_OB.p.x(), -poses[i].X_OB.p.y());
+    points += format("%.2f,%.2f ", poses[i].X.p.x(), -poses[i].X.p.y());
   }
-  points += format("%.2f,%.2f", poses.back().X_OB.p.x(), -poses.back().X_OB.p.y());
+  points += format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
   return "<polyline class=\"" + std::string(name) + "\" points=\"" + points + "\"/>\n";
 }
 
@@ -184,7 +184,7 @@ std::string map_picture_svg(const RunRecord& run) {
 
   Eigen::AlignedBox2d box;
   for (const auto* poses : {&run.truth, &run.estimate}) {
-    for (const StampedPose& pose : *poses) box.extend(pose.X_OB.p.head<2>());
+    for (const TimedPose& pose : *poses) box.extend(pose.X.p.head<2>());
   }
   for (const RunTarget& target : targets) box.extend(target.p_O.head<2>());
   if (backdrop.width > 0) {
@@ -219,8 +219,8 @@ std::string map_picture_svg(const RunRecord& run) {
                    format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
   }
   if (!run.truth.empty()) {
-    const Vec3& start = run.truth.front().X_OB.p;
-    const Vec3& end = run.truth.back().X_OB.p;
+    const Vec3& start = run.truth.front().X.p;
+    const Vec3& end = run.truth.back().X.p;
     svg += circle(start.x(), start.y(), 0.9 * unit, "start", "start");
     svg += format("<path class=\"end\" d=\"M%.2f %.2fl%.2f %.2fm0 %.2fl%.2f %.2f\">",
                   end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit, -1.6 * unit,

@@ -30,6 +30,8 @@ class Summary {
     if (!value || value->is_null()) return {};
     return value->is_string() ? value->get<std::string>() : value->dump();
   }
+  /// Every figure that it may hold.
+  [[nodiscard]] std::vector<FigureInfo> figures() const { return figures_in(json_); }
   /// A figure as people read it; empty if it has no value.
   [[nodiscard]] std::string shown(const FigureInfo& figure) const {
     const ordered_json* value = find(figure.key);
@@ -62,7 +64,7 @@ class Summary {
 
 std::vector<KeyFigure> key_figures(const Summary& summary) {
   std::vector<KeyFigure> figures;
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : summary.figures()) {
     const bool in_heading = figure.key == "outcome" || figure.key == "reason";
     if (!figure.main || in_heading) continue;
     const std::string value = summary.shown(figure);
@@ -77,7 +79,7 @@ std::string every_figure_html(const Summary& summary) {
       "<table class=\"data\">\n<thead><tr><th class=\"word\">figure</th><th>value</th>"
       "<th class=\"word\">in summary.json</th><th class=\"text\">meaning</th></tr></thead>\n"
       "<tbody>\n";
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : summary.figures()) {
     const std::string value = summary.shown(figure);
     html += "<tr><td class=\"word\">" + escape_markup(figure.label) + "</td><td>" +
             (value.empty() ? "–" : escape_markup(value)) + "</td><td class=\"word\"><code>" +

@@ -75,6 +75,62 @@ bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& re
 
 }  // namespace
 
+void DeviceSection::read(std::string_view name, const ConfigNode& section) {
+  const ConfigNode* named = section.find("type");
+  if (named) config_detail::parse_scalar(*named, "type", type);
+  if (type != "mid360" && type != "d430") {
+    throw ConfigError((named ? named->where : section.where) + ": device '" + std::string(name) +
+                      "' has the type '" + type + "', expected mid360 or d430");
+  }
+  own = section;
+  own.entries.clear();
+  for (const ConfigNode::Entry& entry : section.entries) {
+    if (entry.key == "position_m")
+      config_detail::read_value(entry.value, entry.key, mount.position_m);
+    else if (entry.key == "rotation_rad")
+      config_detail::read_value(entry.value, entry.key, mount.rotation_rad);
+    else if (entry.key != "type")
+      own.entries.push_back(entry);
+  }
+  if (type == "mid360") static_cast<void>(over(LidarConfig()));
+  if (type == "d430") static_cast<void>(over(DepthConfig()));
+}
+
+LidarConfig DeviceSection::over(LidarConfig first) const {
+  read_config(own, first);
+  return first;
+}
+
+DepthConfig DeviceSection::over(DepthConfig first) const {
+  read_config(own, first);
+  return first;
+}
+
+std::vector<ParameterInfo> DeviceSection::parameters() const {
+  std::vector<ParameterInfo> all{{"type", type, "", "mid360 or d430"}};
+  for (ParameterInfo& parameter : list_parameters(mount)) all.push_back(std::move(parameter));
+  for (ParameterInfo& parameter :
+       type == "mid360" ? given_parameters<LidarConfig>(own) : given_parameters<DepthConfig>(own)) {
+    all.push_back(std::move(parameter));
+  }
+  return all;
+}
+
+double ScenarioConfig::mapped_frames_hz() const {
+  double frames = lidar.enabled ? lidar.model.rate_hz : 0;
+  const auto depth_frames = [&](const DepthConfig& camera) {
+    return stack.mapping.local.use_depth
+               ? std::min<double>(camera.model.rate_hz, stack.mapping.depth_rate_hz)
+               : 0;
+  };
+  frames += depth_frames(depth);
+  for (const auto& [name, device] : devices) {
+    if (device.type == "mid360") frames += device.over(lidar).model.rate_hz;
+    if (device.type == "d430") frames += depth_frames(device.over(depth));
+  }
+  return frames;
+}
+
 std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
 
 worlds::World Scenario::build_world() const {
@@ -142,6 +198,9 @@ void derive(ScenarioConfig asked, ScenarioConfig& config) {
   coverage.band_low_m = map.band_low_m;
   coverage.band_high_m = map.band_high_m;
   coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;
+  for (const auto& [name, device] : asked.devices) {
+    config.stack.vehicle.mounts[name] = device.mount;
+  }
 }
 
 /// The rule by which the explored region leaves the world; empty: none. Beyond the world's edge
@@ -177,10 +236,12 @@ Scenario make_scenario(const std::string& name, ConfigNode source) {
   scenario.name = name;
   scenario.source = std::move(source);
   refuse_moved_keys(scenario.source);
+  load_plugins(scenario.source);
   ScenarioConfig asked;
   read_config(scenario.source, asked);
   derive(std::move(asked), scenario.config);
   read_config(scenario.source, scenario.config);
+  check_modules(scenario.config.stack, scenario.source);
   if (const std::string rule = broken_region_rule(scenario.config); !rule.empty()) {
     config_detail::fail(config_detail::locate_rule(scenario.source, rule),
                         "out of range: expected " + rule);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,26 +17,49 @@
 #include "sensors/d430.h"
 #include "sensors/imu.h"
 #include "sensors/mid360.h"
-#include "sensors/mocap.h"
+#include "sensors/mocap_device.h"
 #include "stack/stack.h"
 #include "worlds/recipes.h"
 
 namespace arex::sim {
 
-/// Which devices run, and how long they take from measurement to delivery. The depth camera runs
-/// when the stack reads it (mapping.use_depth).
-struct DeviceConfig {
-  bool lidar = true;
-  double lidar_latency_s = 0.003;  ///< network and driver, after the frame's last firing (estimate)
-  double depth_latency_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
+/// The LiDAR that the odometry flies on.
+struct LidarConfig {
+  bool enabled = true;
+  double latency_s = 0.003;  ///< network and driver, after the frame's last firing (estimate)
+  Mid360Config model;        ///< its keys stand directly under `lidar`
 
   void fields(auto& f) {
-    f("lidar", lidar, "fire the LiDAR");
-    f("lidar_latency_s", lidar_latency_s, "end of a LiDAR frame to its delivery");
-    f("depth_latency_s", depth_latency_s, "exposure of a depth frame to its delivery");
-    f.check(lidar_latency_s >= 0 && lidar_latency_s <= 60, "0 <= lidar_latency_s <= 60");
-    f.check(depth_latency_s >= 0 && depth_latency_s <= 60, "0 <= depth_latency_s <= 60");
+    f("enabled", enabled, "fire it");
+    f("latency_s", latency_s, "end of a frame to its delivery");
+    model.fields(f);
+    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
   }
+};
+
+/// The depth camera; it runs when the stack reads it (mapping.use_depth).
+struct DepthConfig {
+  double latency_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
+  D430Config model;          ///< its keys stand directly under `depth`
+
+  void fields(auto& f) {
+    f("latency_s", latency_s, "exposure of a frame to its delivery");
+    model.fields(f);
+    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
+  }
+};
+
+/// A further device: its type, where it sits, and what differs from `lidar` or `depth`.
+struct DeviceSection {
+  std::string type;  ///< mid360 or d430
+  MountConfig mount;
+  ConfigNode own;  ///< of its type
+
+  void read(std::string_view name, const ConfigNode& section);
+  [[nodiscard]] std::vector<ParameterInfo> parameters() const;
+  /// Its parameters over those of the first of its type. @pre of that type
+  [[nodiscard]] LidarConfig over(LidarConfig first) const;
+  [[nodiscard]] DepthConfig over(DepthConfig first) const;
 };
 
 /// What the truth is compared with. Coverage is scored on explorations only.
@@ -63,10 +87,10 @@ struct ScenarioConfig {
   worlds::WorldConfig world;
   PhysicsConfig physics;
   ImuConfig imu;
-  Mid360Config lidar;
-  D430Config depth;
+  LidarConfig lidar;
+  DepthConfig depth;
   MocapConfig mocap;
-  DeviceConfig devices;
+  std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
   StackConfig stack;
   ScoringConfig scoring;
@@ -79,24 +103,28 @@ struct ScenarioConfig {
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
     f("mocap", mocap, "motion capture, where odometry.source is that");
-    f("devices", devices, "which run, and how long they take");
+    f("devices", devices,
+      "further ones by name: {type: mid360|d430, position_m: [..], rotation_rad: [..], ...}; what "
+      "they leave out is as under lidar or depth");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
     f("scoring", scoring, "what the truth is compared with");
-    f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
-            "devices.lidar true, or odometry.source mocap");
+    f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
+                !devices.contains("mocap"),
+            "devices with other names than imu, lidar, depth and mocap, which the first ones have");
+    f.check(lidar.enabled || stack.odometry.source == "mocap",
+            "lidar.enabled true, or odometry.source mocap");
     // Software that takes longer than the time between two frames falls ever further behind.
-    const double scans_hz = devices.lidar ? lidar.rate_hz : 0;
-    const double frames_hz = stack.mapping.local.use_depth
-                                 ? std::min<double>(depth.rate_hz, stack.mapping.depth_rate_hz)
-                                 : 0;
-    f.check(stack.odometry.source == OdometryConfig::Source::kMocap ||
-                scans_hz * stack.odometry.latency_s <= 1,
+    f.check(!stack.uses_odometry("lidar_inertial") ||
+                lidar.enabled * lidar.model.rate_hz * stack.odometry.latency_s <= 1,
             "odometry.latency_s <= 1 / lidar.rate_hz");
-    f.check(!stack.mapping.enabled || (scans_hz + frames_hz) * stack.mapping.latency_s <= 1,
+    f.check(!stack.mapping.enabled || mapped_frames_hz() * stack.mapping.latency_s <= 1,
             "mapping.latency_s <= 1 / (lidar.rate_hz + lesser of depth.rate_hz, "
-            "mapping.depth_rate_hz)");
+            "mapping.depth_rate_hz), further devices counted");
   }
+
+  /// Frames that the maps take, of all devices.
+  [[nodiscard]] double mapped_frames_hz() const;
 };
 
 /// A scenario as it was asked for.

@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "config/text.h"
+#include "math/fingerprint.h"
 #include "run/file_io.h"
 #include "run/foreign_json.h"
 #include "run/summary.h"
-#include "run/trajectory_hash.h"
 #include "sweep/child_process.h"
 
 namespace arex::sim {
@@ -72,7 +72,7 @@ std::vector<fs::path> batch_files(const SweepFolder& folder) {
 
 // One name, one batch of one folder: that is how it is found again in the queue.
 std::string batch_name(const SweepFolder& folder, const std::string& sweep, std::size_t number) {
-  TrajectoryHash hash;
+  Fingerprint hash;
   const std::string root = folder.root().string();
   hash.add_bytes(std::span<const char>(root));
   std::string name =

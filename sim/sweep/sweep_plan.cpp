@@ -10,9 +10,9 @@
 #include <set>
 #include <stdexcept>
 
+#include "math/fingerprint.h"
 #include "math/random.h"
 #include "run/scenario.h"
-#include "run/trajectory_hash.h"
 
 namespace arex::sim {
 namespace {
@@ -210,7 +210,7 @@ std::string run_id(const std::string& build, const std::string& scenario, int re
                    const std::string& resolved) {
   const std::string text =
       build + "\n" + scenario + "\n" + std::to_string(repeat) + "\n" + resolved;
-  TrajectoryHash hash;
+  Fingerprint hash;
   hash.add_bytes(std::span<const char>(text));
   return hash.text();
 }
@@ -218,7 +218,7 @@ std::string run_id(const std::string& build, const std::string& scenario, int re
 std::string fingerprint(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> block(1 << 20);
-  TrajectoryHash hash;
+  Fingerprint hash;
   while (stream.read(block.data(), static_cast<std::streamsize>(block.size())),
          stream.gcount() > 0) {
     hash.add_bytes(std::span<const char>(block.data(), static_cast<std::size_t>(stream.gcount())));

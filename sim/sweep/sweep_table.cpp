@@ -120,7 +120,9 @@ Fields part_of(const Fields& fields, bool host) {
 // Every figure's column, so that a table's columns do not depend on what its runs measured.
 Fields empty_fields() {
   Fields fields;
-  for (const FigureInfo& figure : figure_list()) fields.emplace_back(figure.column(), "");
+  for (const FigureInfo& figure : figure_list()) {
+    if (!figure.is_named()) fields.emplace_back(figure.column(), "");
+  }
   return fields;
 }
 

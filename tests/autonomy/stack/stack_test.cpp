@@ -27,7 +27,7 @@ class HallFlight {
         AutopilotStatus autopilot;
         autopilot.attitude.R_AB = X_.R;
         autopilot.ready = autopilot.follows = true;
-        autopilot.armed = stack_.mission().state() != MissionState::kInitialise;
+        autopilot.armed = stack_.view().state != MissionState::kInitialise;
         autopilot.landed = !autopilot.armed;
         stack_.add_autopilot(autopilot);
         stack_.add_mocap({now_, X_OO * X_, Vec3::Zero()});
@@ -39,10 +39,12 @@ class HallFlight {
                                 test::SensorNoise::none(), 1, 8)));
       }
       jobs_.advance(now_);
-      const TrajectorySetpoint before = stack_.setpoint();
+      const TrajectorySetpoint before = stack_.view().setpoint;
       (void)stack_.tick();
-      largest_step_m_ = std::max(largest_step_m_, (stack_.setpoint().p_OB - before.p_OB).norm());
-      X_ = X_OO.inverse() * Pose{so3::from_yaw(stack_.setpoint().yaw_rad), stack_.setpoint().p_OB};
+      largest_step_m_ =
+          std::max(largest_step_m_, (stack_.view().setpoint.p_OB - before.p_OB).norm());
+      X_ = X_OO.inverse() *
+           Pose{so3::from_yaw(stack_.view().setpoint.yaw_rad), stack_.view().setpoint.p_OB};
     }
   }
 
@@ -56,7 +58,7 @@ class HallFlight {
 
 StackConfig goals(std::vector<Vec3> points) {
   StackConfig config;
-  config.odometry.source = OdometryConfig::Source::kMocap;
+  config.odometry.source = "mocap";
   config.mapping.local.use_depth = false;
   config.mission.kind = MissionConfig::Kind::kGoals;
   config.mission.waypoints_m = std::move(points);
@@ -77,31 +79,31 @@ std::string events_of(Stack& stack, EventKind kind) {
 TEST(Stack, AfterAJumpTheMapIsForgottenAndTheFlightGoesOnFromWhereItIs) {
   HallFlight flight(goals({{8, 0, 1.5}, {0, 0, 1.5}}));
   flight.run(8);
-  ASSERT_EQ(flight.stack_.mission().state(), MissionState::kFly);
-  ASSERT_TRUE(flight.stack_.perception().grid());
+  ASSERT_EQ(flight.stack_.view().state, MissionState::kFly);
+  ASSERT_TRUE(flight.stack_.view().grid);
   const Vec3 before = flight.X_.p;
   const Pose slip{so3::from_yaw(0.3), {1.0, -0.6, 0.1}};
   flight.run(0.02, slip);
   // Nothing of before is left ...
-  EXPECT_FALSE(flight.stack_.perception().grid());
+  EXPECT_FALSE(flight.stack_.view().grid);
   // ... the vehicle is asked to stay where it is ...
   EXPECT_LT((flight.X_.p - before).norm(), 0.05);
-  EXPECT_LT((flight.stack_.setpoint().p_OB - slip * before).norm(), 0.05);
+  EXPECT_LT((flight.stack_.view().setpoint.p_OB - slip * before).norm(), 0.05);
   // ... and goes on when there is a map again.
   flight.largest_step_m_ = 0;
   flight.run(40, slip);
   EXPECT_LT(flight.largest_step_m_, 0.05);
-  EXPECT_TRUE(flight.stack_.perception().grid());
-  EXPECT_EQ(flight.stack_.mission().stuck(), "");
-  EXPECT_EQ(flight.stack_.mission().targets().size(), 2U);
+  EXPECT_TRUE(flight.stack_.view().grid);
+  EXPECT_EQ(flight.stack_.view().stuck, "");
+  EXPECT_EQ(flight.stack_.view().targets.size(), 2U);
 }
 
 TEST(Stack, AStepSmallerThanTheMapsMarginChangesNothing) {
   HallFlight flight(goals({{8, 0, 1.5}}));
   flight.run(8);
-  const auto grid = flight.stack_.perception().grid();
+  const auto grid = flight.stack_.view().grid;
   flight.run(0.02, {Mat3::Identity(), {0.1, 0, 0}});
-  EXPECT_EQ(flight.stack_.perception().grid(), grid);
+  EXPECT_EQ(flight.stack_.view().grid, grid);
 }
 
 // The last waypoint is above a car: it says so, and flies on to where the ground is free.
@@ -112,12 +114,11 @@ TEST(Stack, LandsBesideNotOnWhatStandsBelowItsLastWaypoint) {
     config.mission.kind = kind;
     config.mission.takeoff_height_m = 2.5;
     HallFlight flight(config, test::AnalyticWorld::parked_car());
-    while (flight.stack_.mission().state() != MissionState::kLand &&
-           flight.now_ < from_seconds(90)) {
+    while (flight.stack_.view().state != MissionState::kLand && flight.now_ < from_seconds(90)) {
       flight.run(0.1);
     }
-    ASSERT_EQ(flight.stack_.mission().state(), MissionState::kLand);
-    EXPECT_EQ(flight.stack_.mission().stuck(), "");
+    ASSERT_EQ(flight.stack_.view().state, MissionState::kLand);
+    EXPECT_EQ(flight.stack_.view().stuck, "");
     const Vec2 off =
         ((flight.X_.p.head<2>() - Vec2(10, 0)).cwiseAbs() - Vec2(2.2, 0.9)).cwiseMax(0);
     EXPECT_GT(off.norm(), 0.6);  // the vehicle and its margin
@@ -139,7 +140,7 @@ TEST(Stack, NamesASourceThatHasFallenSilentBeforeTakeOff) {
     if (now < from_seconds(0.3)) stack.add_mocap({now, Pose{}, Vec3::Zero()});
     (void)stack.tick();
   }
-  EXPECT_EQ(stack.mission().stuck(), "not_ready: no_mocap");
+  EXPECT_EQ(stack.view().stuck, "not_ready: no_mocap");
   EXPECT_NE(events_of(stack, EventKind::kStuck).find("not_ready"), std::string::npos);
 }
 

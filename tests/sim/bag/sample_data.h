@@ -1,6 +1,6 @@
 #pragma once
 
-#include "run/bag_writer.h"
+#include "bag/bag_writer.h"
 
 /// A second of made-up measurements. check_bag.py knows the same formulas; all values are exact in
 /// binary, so that it can demand equality.

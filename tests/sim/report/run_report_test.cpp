@@ -184,10 +184,10 @@ TEST(RunReport, PathsReadBackWithinAMillimetre) {
   ASSERT_EQ(x.size(), t.size());
   for (std::size_t i = 0; i < t.size(); ++i) {
     const auto nearest = std::min_element(
-        run.truth.begin(), run.truth.end(), [&](const StampedPose& a, const StampedPose& b) {
+        run.truth.begin(), run.truth.end(), [&](const TimedPose& a, const TimedPose& b) {
           return std::abs(a.time_s - t[i]) < std::abs(b.time_s - t[i]);
         });
-    ASSERT_NEAR(nearest->X_OB.p.x(), x[i], 1e-3);
+    ASSERT_NEAR(nearest->X.p.x(), x[i], 1e-3);
   }
   EXPECT_NEAR(t.back(), run.truth.back().time_s, 1e-6);
 }

@@ -362,7 +362,7 @@ TEST(CommandLine, SaysItsVersion) {
 std::vector<std::string> short_run(const TemporaryFolder& folder) {
   return {"run",   kWaypoints,
           "--set", "mission.max_time_s=0.1",
-          "--set", "devices.lidar=false",
+          "--set", "lidar.enabled=false",
           "--set", "odometry.source=mocap",
           "--set", "mapping.use_depth=false",
           "--out", (folder / "run").string()};

@@ -198,7 +198,7 @@ TEST_F(SweepRecovery, AFileThatMayNotGrowIsNoCrashToBeTriedAgain) {
   // 30 kB a file: a plan's configuration fits, a flight of some seconds does not.
   write_text(folder / "sweep.yaml", "base: " AREX_SOURCE_DIR
                                     "/scenarios/inflation.yaml\nset: {mission.max_time_s: 5, "
-                                    "devices.lidar: false, odometry.source: mocap, "
+                                    "lidar.enabled: false, odometry.source: mocap, "
                                     "mapping.use_depth: false}\nretries: 3\n");
   words[5] = (folder / "sweep.yaml").string();
   const ProcessResult result = test::run_process("/bin/sh", words);

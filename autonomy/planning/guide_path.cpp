@@ -5,6 +5,8 @@
 #include <limits>
 #include <queue>
 
+#include "mapping/distance_transform.h"
+
 namespace arex {
 namespace {
 
@@ -100,37 +102,22 @@ class CostMap {
   }
 
  private:
-  /// Distances (cells) to the nearest occupied cell, by a two-pass chamfer transform.
+  /// Distances (cells) to the nearest occupied cell: the same as the explorer's, so that what one
+  /// calls passable is passable for the other.
   void measure_distances() {
-    const auto n = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y());
-    distance_.assign(n, 1e9);
+    std::vector<bool> occupied(static_cast<std::size_t>(size_.x()) *
+                               static_cast<std::size_t>(size_.y()));
     for (int y = 0; y < map_.height; ++y) {
       for (int x = 0; x < map_.width; ++x) {
-        if (map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied) {
-          distance_[index({x, y})] = 0;
-        }
+        occupied[index({x, y})] = map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied;
       }
     }
-    // Of a row first what the row before it says, which the compiler turns into vector code, then
-    // what its own cells say one after the other. The outermost columns are blocked anyway.
-    const auto w = static_cast<std::size_t>(size_.x());
-    const auto h = static_cast<std::size_t>(size_.y());
-    const auto take_row = [&](double* row, const double* before) {
-      for (std::size_t x = 1; x + 1 < w; ++x) {
-        const double diagonal = std::min(before[x - 1], before[x + 1]) + M_SQRT2;
-        row[x] = std::min(row[x], std::min(before[x] + 1.0, diagonal));
-      }
-    };
-    for (std::size_t y = 1; y < h; ++y) {
-      double* const row = distance_.data() + y * w;
-      take_row(row, row - w);
-      for (std::size_t x = 1; x < w; ++x) row[x] = std::min(row[x], row[x - 1] + 1.0);
-    }
-    for (std::size_t y = h - 1; y-- > 0;) {
-      double* const row = distance_.data() + y * w;
-      take_row(row, row + w);
-      for (std::size_t x = w - 1; x-- > 0;) row[x] = std::min(row[x], row[x + 1] + 1.0);
-    }
+    const auto squared = squared_distances(size_.x(), size_.y(),
+                                           [&](std::size_t cell) { return occupied[cell]; });
+    distance_.resize(squared.size());
+    std::transform(squared.begin(), squared.end(), distance_.begin(), [](std::int32_t d2) {
+      return d2 == kNoObstacle ? kInfinity : std::sqrt(static_cast<double>(d2));
+    });
   }
 
   const OccupancyMap2D& map_;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "autonomy/exploration/test_map.h"
+#include "exploration/nearest_explorer.h"
 #include "exploration/revenue_explorer.h"
 
 namespace arex {

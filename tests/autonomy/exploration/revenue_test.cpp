@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "autonomy/exploration/test_map.h"
+#include "exploration/candidate_filter.h"
+#include "exploration/exploration_space.h"
 #include "config/config.h"
 #include "exploration/explorer.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "odometry/inertial/navigation_state.h"
 #include "odometry/lidar_inertial_config.h"
-#include "odometry/navigation_state.h"
 
 namespace arex {
 

@@ -4,7 +4,7 @@
 
 #include "messages/estimates.h"
 #include "messages/vehicle.h"
-#include "odometry/imu_predictor.h"
+#include "odometry/inertial/imu_predictor.h"
 #include "odometry/scan_corrector.h"
 
 namespace arex {

@@ -19,18 +19,6 @@ std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoi
   return fractions;
 }
 
-/// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
-/// of a worse grade, and its bias, which standing for a second cannot tell, wanders in proportion.
-ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured) {
-  const double gyro = std::max(1.0, measured.gyro / imu.gyro_noise_density);
-  const double accel = std::max(1.0, measured.accel / imu.accel_noise_density);
-  imu.gyro_noise_density *= gyro;
-  imu.gyro_walk_density *= gyro;
-  imu.accel_noise_density *= accel;
-  imu.accel_walk_density *= accel;
-  return imu;
-}
-
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -43,12 +31,12 @@ ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL
       map_(config.map) {}
 
 ScanUpdate ScanCorrector::correct(const ScanJob& job) {
-  imu_.insert(imu_.end(), job.imu.begin(), job.imu.end());
+  imu_.add(job.imu);
   gyro_.full_scale_radps = job.gyro_full_scale_radps;
   ScanUpdate update;
   update.begin = job.scan->stamp;
   update.stamp = job.scan->end;
-  if (stood_at_ && misses_imu(samples_until(update.stamp), update.stamp)) start_again();
+  if (stood_at_ && misses_imu(imu_.between(stamp_, update.stamp), update.stamp)) start_again();
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
@@ -82,9 +70,7 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   standing_scans_.push_back(scan);
   const Stamp window_begin = scan->end - from_seconds(config_.initialiser.window_s);
   std::erase_if(standing_scans_, [&](const LidarScanPtr& s) { return s->stamp < window_begin; });
-  const auto until = std::upper_bound(imu_.begin(), imu_.end(), scan->end,
-                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  const std::span<const ImuSample> samples(imu_.begin(), until);
+  const std::span<const ImuSample> samples = imu_.until(scan->end);
   need_ = misses_imu(samples, scan->end) ? OdometryNeed::kImu
                                          : missing_for_start(samples, config_.initialiser);
   const auto standing = start_from_standstill(samples, X_BL_, config_);
@@ -93,12 +79,12 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   }
   if (need_ != OdometryNeed::kNothing) {
     // One window and what a late scan may lack.
-    forget_imu_before(window_begin - from_seconds(0.2));
+    imu_.forget_before(window_begin - from_seconds(0.2));
     return;
   }
   status_ = OdometryStatus::kOk;
   standing_scans_.clear();
-  forget_imu_before(stamp_);
+  imu_.forget_before(stamp_);
 }
 
 bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
@@ -127,12 +113,6 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   corrected_position_ = filter_.state().p_OB;
   stood_at_ = filter_.state().X_OB();
   return true;
-}
-
-bool ScanCorrector::misses_imu(std::span<const ImuSample> samples, Stamp until) const {
-  // By as much again the IMU's clock may be off.
-  const Stamp lag = 2 * kMaxImuGap;
-  return samples.empty() || until - samples.back().stamp > lag || has_gap(samples);
 }
 
 void ScanCorrector::start_again() {
@@ -172,7 +152,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     gyro_.missing_radps = missing;
     if (!clipped.any() || change < kSettled || pass == kPasses) {
       stamp_ = scan.end;
-      forget_imu_before(stamp_);
+      imu_.forget_before(stamp_);
       return points;
     }
     filter_ = before;
@@ -182,7 +162,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
 std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (ImuInterval& imu : imu_intervals(imu_, stamp_, stamp, accel_scale_)) {
+  for (ImuInterval& imu : imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_)) {
     gyro_.complete(imu);
     clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));
@@ -191,15 +171,10 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
   return segments;
 }
 
-std::span<const ImuSample> ScanCorrector::samples_until(Stamp until) const {
-  const auto after = [](Stamp t, const ImuSample& s) { return t < s.stamp; };
-  const auto begin = std::upper_bound(imu_.begin(), imu_.end(), stamp_, after);
-  return {begin, std::upper_bound(begin, imu_.end(), until, after)};
-}
-
 void ScanCorrector::hold_standstill(Stamp until) {
   const NavigationState& x = filter_.state();
-  if (!stands_still(samples_until(until), x, accel_scale_, config_.initialiser, white_noise_)) {
+  if (!stands_still(imu_.between(stamp_, until), x, accel_scale_, config_.initialiser,
+                    white_noise_)) {
     stood_at_.reset();
     return;
   }
@@ -279,12 +254,6 @@ void ScanCorrector::insert(const std::vector<ScanPoint>& points,
                                            config_.lidar.lateral_variance(range)));
   }
   map_.insert(points_O, variances);
-}
-
-void ScanCorrector::forget_imu_before(Stamp stamp) {
-  const auto after = std::upper_bound(imu_.begin(), imu_.end(), stamp,
-                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  if (after != imu_.begin()) imu_.erase(imu_.begin(), after - 1);
 }
 
 }  // namespace arex

@@ -3,7 +3,7 @@
 #include <array>
 
 #include "math/types.h"
-#include "odometry/navigation_state.h"
+#include "odometry/inertial/navigation_state.h"
 
 /// A gyro that turns faster than its full scale reads the full scale. The odometry notices it by
 /// the readings alone and lets the scans say what they lack.

@@ -1,4 +1,4 @@
-#include "odometry/imu_predictor.h"
+#include "odometry/inertial/imu_predictor.h"
 
 #include <algorithm>
 

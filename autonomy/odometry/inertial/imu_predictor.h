@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "messages/estimates.h"
-#include "odometry/gyro_clipping.h"
-#include "odometry/navigation_state.h"
+#include "odometry/inertial/gyro_clipping.h"
+#include "odometry/inertial/navigation_state.h"
 
 namespace arex {
 

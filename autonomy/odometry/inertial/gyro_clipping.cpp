@@ -1,4 +1,4 @@
-#include "odometry/gyro_clipping.h"
+#include "odometry/inertial/gyro_clipping.h"
 
 #include <algorithm>
 #include <cmath>

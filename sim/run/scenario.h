@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -101,6 +102,8 @@ struct Scenario {
   std::string name;  ///< the file's name without its ending
   ScenarioConfig config;
   ConfigNode source;  ///< what the file and the overrides say, for messages
+  /// The world of kind file, where something had to be known of it to read the scenario.
+  std::shared_ptr<const worlds::FileWorld> file_world;
 
   /// Every value; running it again gives the same trajectory hash.
   [[nodiscard]] std::string resolved_yaml() const;
@@ -108,12 +111,19 @@ struct Scenario {
   /// of a point which the mission flies to if that lies off the world or below its ground, and of
   /// `mission` if the vehicle has no room where it is to explore from.
   [[nodiscard]] worlds::World build_world() const;
+  /// The world of kind file as it was understood. @throws ConfigError at the line of `world`.
+  [[nodiscard]] std::shared_ptr<const worlds::FileWorld> read_file_world() const;
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;
 };
 
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
 Pose start_pose(const worlds::World& world);
+
+/// Names of files in a `world` section become absolute. They are relative to the file that says so,
+/// on the command line to the working directory.
+/// @param node what was said of the section
+void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world);
 
 /// The scenario that `source` asks for, checked, with what follows from it (such as the battery
 /// that the stack believes in). Whatever runs, sweeps, prints or checks a scenario has it from

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 
+#include "config/text.h"
 #include "worlds/file_readers.h"
 
 namespace arex::worlds {
@@ -112,24 +114,47 @@ class Flattener {
   std::size_t left_out_ = 0;
 };
 
+/// What stands in an attribute or between tags of the head of a COLLADA file; empty: nothing.
+std::string after(const std::string& head, std::string_view tag, char from, char to) {
+  const std::size_t at = head.find(tag);
+  if (at == std::string::npos) return {};
+  const std::size_t begin = head.find(from, at + tag.size() - 1);
+  if (begin == std::string::npos) return {};
+  const std::size_t end = head.find(to, begin + 1);
+  return end == std::string::npos ? "" : head.substr(begin + 1, end - begin - 1);
+}
+
+/// The asset's up axis and unit: Assimp applies the unit and tells neither.
+void read_asset(const std::filesystem::path& file, FileScene& scene) {
+  constexpr std::size_t kHead = 1 << 20;
+  const std::string head = read_bytes(file).substr(0, kHead);
+  const std::string up = after(head, "<up_axis>", '>', '<');
+  scene.up = up.find("Z_UP") != std::string::npos   ? FileUp::kZ
+             : up.find("X_UP") != std::string::npos ? FileUp::kX
+                                                    : FileUp::kY;  // COLLADA's default
+  const std::size_t unit = head.find("<unit");
+  if (unit == std::string::npos) return;
+  const std::string tag = head.substr(unit, head.find('>', unit) - unit);
+  const auto metres = parse_double(after(tag, "meter=", '"', '"'));
+  if (metres) scene.unit_m = *metres;
+}
+
 }  // namespace
 
-FileScene read_assimp(const std::filesystem::path& file, bool as_is) {
+FileScene read_assimp(const std::filesystem::path& file) {
   Assimp::Importer importer;
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, as_is);
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
-  // Whether it is a float or a vertex that is beyond its end: the check names it, the rest crashes.
-  const aiScene* scene = importer.ReadFile(
-      file.string(), aiProcess_Triangulate | aiProcess_ValidateDataStructure);
+  const aiScene* scene =
+      importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_ValidateDataStructure);
   if (scene == nullptr) {
     const std::string reason = importer.GetErrorString();
     throw std::runtime_error("cannot be read" + (reason.empty() ? "" : ": " + reason));
   }
   FileScene out = Flattener(*scene, file.parent_path()).flatten();
   const std::string ending = file.extension().string();
-  const bool collada = ending == ".dae" || ending == ".DAE";
-  const bool gltf = ending.starts_with(".gl") || ending.starts_with(".GL");
-  if ((collada && !as_is) || gltf) out.up = FileUp::kY;  // what Assimp turns COLLADA to
+  if (ending == ".dae" || ending == ".DAE") read_asset(file, out);
+  if (ending.starts_with(".gl") || ending.starts_with(".GL")) out.up = FileUp::kY;
   return out;
 }
 

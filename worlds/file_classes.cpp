@@ -18,24 +18,24 @@ struct Word {
 
 // The first of them that a name holds decides: a tree's leaves before the tree.
 constexpr std::array kWords{
-    Word{"leaf", SurfaceClass::kLeaf},        Word{"leaves", SurfaceClass::kLeaf},
-    Word{"foliage", SurfaceClass::kLeaf},     Word{"canopy", SurfaceClass::kLeaf},
-    Word{"branch", SurfaceClass::kBranch},    Word{"twig", SurfaceClass::kBranch},
-    Word{"trunk", SurfaceClass::kTrunk},      Word{"bark", SurfaceClass::kTrunk},
-    Word{"stem", SurfaceClass::kTrunk},       Word{"shrub", SurfaceClass::kShrub},
-    Word{"bush", SurfaceClass::kShrub},       Word{"tree", SurfaceClass::kTrunk},
-    Word{"log", SurfaceClass::kLog},          Word{"ceiling", SurfaceClass::kCeiling},
-    Word{"roof", SurfaceClass::kCeiling},     Word{"ramp", SurfaceClass::kRamp},
-    Word{"pillar", SurfaceClass::kPillar},    Word{"column", SurfaceClass::kPillar},
-    Word{"pole", SurfaceClass::kPillar},      Word{"beam", SurfaceClass::kBeam},
-    Word{"pipe", SurfaceClass::kPipe},        Word{"kerb", SurfaceClass::kKerb},
-    Word{"curb", SurfaceClass::kKerb},        Word{"door", SurfaceClass::kDoor},
-    Word{"car", SurfaceClass::kCar},          Word{"vehicle", SurfaceClass::kCar},
-    Word{"truck", SurfaceClass::kCar},        Word{"wall", SurfaceClass::kWall},
-    Word{"fence", SurfaceClass::kWall},       Word{"floor", SurfaceClass::kFloor},
-    Word{"ground", SurfaceClass::kGround},    Word{"terrain", SurfaceClass::kGround},
-    Word{"grass", SurfaceClass::kGround},     Word{"soil", SurfaceClass::kGround},
-    Word{"asphalt", SurfaceClass::kGround},   Word{"heightmap", SurfaceClass::kGround}};
+    Word{"leaf", SurfaceClass::kLeaf},      Word{"leaves", SurfaceClass::kLeaf},
+    Word{"foliage", SurfaceClass::kLeaf},   Word{"canopy", SurfaceClass::kLeaf},
+    Word{"branch", SurfaceClass::kBranch},  Word{"twig", SurfaceClass::kBranch},
+    Word{"trunk", SurfaceClass::kTrunk},    Word{"bark", SurfaceClass::kTrunk},
+    Word{"stem", SurfaceClass::kTrunk},     Word{"shrub", SurfaceClass::kShrub},
+    Word{"bush", SurfaceClass::kShrub},     Word{"tree", SurfaceClass::kTrunk},
+    Word{"log", SurfaceClass::kLog},        Word{"ceiling", SurfaceClass::kCeiling},
+    Word{"roof", SurfaceClass::kCeiling},   Word{"ramp", SurfaceClass::kRamp},
+    Word{"pillar", SurfaceClass::kPillar},  Word{"column", SurfaceClass::kPillar},
+    Word{"pole", SurfaceClass::kPillar},    Word{"beam", SurfaceClass::kBeam},
+    Word{"pipe", SurfaceClass::kPipe},      Word{"kerb", SurfaceClass::kKerb},
+    Word{"curb", SurfaceClass::kKerb},      Word{"door", SurfaceClass::kDoor},
+    Word{"car", SurfaceClass::kCar},        Word{"vehicle", SurfaceClass::kCar},
+    Word{"truck", SurfaceClass::kCar},      Word{"wall", SurfaceClass::kWall},
+    Word{"fence", SurfaceClass::kWall},     Word{"floor", SurfaceClass::kFloor},
+    Word{"ground", SurfaceClass::kGround},  Word{"terrain", SurfaceClass::kGround},
+    Word{"grass", SurfaceClass::kGround},   Word{"soil", SurfaceClass::kGround},
+    Word{"asphalt", SurfaceClass::kGround}, Word{"heightmap", SurfaceClass::kGround}};
 
 /// Whether `text` holds `word` as a word, in the singular or the plural: "cart" is no car.
 bool holds(std::string_view text, std::string_view word) {
@@ -53,8 +53,9 @@ bool holds(std::string_view text, std::string_view word) {
                              std::islower(static_cast<unsigned char>(text[i - 1])) != 0);
   };
   for (std::size_t at = 0; at + word.size() <= text.size(); ++at) {
-    const bool same = std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
-                                 [](char a, char b) { return a == lower(b); });
+    const bool same =
+        std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
+                   [](char a, char b) { return a == lower(b); });
     if (!same || !begins(at)) continue;
     const std::size_t end = at + word.size();
     const bool plural = end < text.size() && lower(text[end]) == 's' && ends(end + 1);

@@ -100,7 +100,7 @@ int wait_for(pid_t child) {
 }
 
 std::string read_back(int fd) {
-  struct stat info{};
+  struct stat info {};
   if (fstat(fd, &info) != 0) throw std::runtime_error("the reader's answer cannot be read");
   std::string text(static_cast<std::size_t>(info.st_size), '\0');
   for (std::size_t done = 0; done < text.size();) {

@@ -80,7 +80,8 @@ Header read_header(std::string_view bytes) {
     if (key == "FIELDS") {
       while (words >> word) header.fields.push_back({word});
     } else if (key == "SIZE") {
-      each_field(words, header.fields, [](Field& f, const std::string& w) { f.size = number_of(w); });
+      each_field(words, header.fields,
+                 [](Field& f, const std::string& w) { f.size = number_of(w); });
     } else if (key == "TYPE") {
       each_field(words, header.fields,
                  [](Field& f, const std::string& w) { f.type = w.empty() ? '?' : w[0]; });

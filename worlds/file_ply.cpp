@@ -46,11 +46,11 @@ struct Element {
 
 Type type_of(const std::string& name) {
   static const std::map<std::string, Type, std::less<>> kTypes{
-      {"char", Type::kI8},     {"int8", Type::kI8},     {"uchar", Type::kU8},
-      {"uint8", Type::kU8},    {"short", Type::kI16},   {"int16", Type::kI16},
-      {"ushort", Type::kU16},  {"uint16", Type::kU16},  {"int", Type::kI32},
-      {"int32", Type::kI32},   {"uint", Type::kU32},    {"uint32", Type::kU32},
-      {"float", Type::kF32},   {"float32", Type::kF32}, {"double", Type::kF64},
+      {"char", Type::kI8},    {"int8", Type::kI8},     {"uchar", Type::kU8},
+      {"uint8", Type::kU8},   {"short", Type::kI16},   {"int16", Type::kI16},
+      {"ushort", Type::kU16}, {"uint16", Type::kU16},  {"int", Type::kI32},
+      {"int32", Type::kI32},  {"uint", Type::kU32},    {"uint32", Type::kU32},
+      {"float", Type::kF32},  {"float32", Type::kF32}, {"double", Type::kF64},
       {"float64", Type::kF64}};
   const auto found = kTypes.find(name);
   if (found == kTypes.end()) throw std::runtime_error("has a property of unknown type " + name);
@@ -122,9 +122,7 @@ class Numbers {
  public:
   Numbers(std::string_view data, Encoding encoding) : left_(data), encoding_(encoding) {}
 
-  double next(Type type) {
-    return encoding_ == Encoding::kAscii ? next_word() : next_binary(type);
-  }
+  double next(Type type) { return encoding_ == Encoding::kAscii ? next_word() : next_binary(type); }
   [[nodiscard]] std::size_t bytes_left() const { return left_.size(); }
 
  private:
@@ -140,7 +138,8 @@ class Numbers {
     const auto [stop, error] = std::from_chars(left_.data(), left_.data() + left_.size(), value);
     const auto length = static_cast<std::size_t>(stop - left_.data());
     if (error != std::errc() || (length < left_.size() && !is_space(left_[length]))) {
-      throw std::runtime_error("has '" + shortened(left_.substr(0, left_.find_first_of(" \r\n\t")), 20) +
+      throw std::runtime_error("has '" +
+                               shortened(left_.substr(0, left_.find_first_of(" \r\n\t")), 20) +
                                "' where a number is expected");
     }
     left_.remove_prefix(length);
@@ -281,11 +280,9 @@ class Faces {
   std::uint32_t group_of(const FaceLabel& label) {
     const bool own = label.surface_class >= 0 &&
                      label.surface_class < static_cast<double>(kSurfaceClassNames.size());
-    const std::array<double, 3> key{std::isnan(label.object) ? -1 : label.object,
-                                    own ? label.surface_class : -1,
-                                    own && label.reflectivity >= 0 && label.reflectivity <= 1
-                                        ? label.reflectivity
-                                        : -1};
+    const std::array<double, 3> key{
+        std::isnan(label.object) ? -1 : label.object, own ? label.surface_class : -1,
+        own && label.reflectivity >= 0 && label.reflectivity <= 1 ? label.reflectivity : -1};
     const auto [place, fresh] =
         group_of_label_.try_emplace(key, static_cast<std::uint32_t>(scene_.groups.size()));
     if (fresh) {
@@ -305,7 +302,8 @@ class Faces {
   void add(std::uint32_t group) {
     const auto most = static_cast<double>(scene_.vertices.size());
     for (const double corner : face_) {
-      if (!(corner >= 0 && corner < most)) throw std::runtime_error("has a face of unknown vertices");
+      if (!(corner >= 0 && corner < most))
+        throw std::runtime_error("has a face of unknown vertices");
     }
     for (std::size_t k = 1; k + 1 < face_.size(); ++k) {
       scene_.triangles.push_back({static_cast<std::uint32_t>(face_[0]),

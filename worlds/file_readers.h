@@ -6,14 +6,14 @@
 
 #include "worlds/file_scene.h"
 
-/// One reader for each kind of file. All throw an exception whose what() says what is wrong with the
-/// file, without its name. They are run by run_contained(): two of the libraries behind them crash
-/// on damaged files.
+/// One reader for each kind of file. All throw an exception whose what() says what is wrong with
+/// the file, without its name. They are run by run_contained(): two of the libraries behind them
+/// crash on damaged files.
 namespace arex::worlds {
 
-/// COLLADA, glTF, OBJ, STL by Assimp. The scene graph is flattened; the nodes' names stay.
-/// @param as_is leave the file's axes as they stand, whatever it says of its up axis
-FileScene read_assimp(const std::filesystem::path& file, bool as_is);
+/// COLLADA, glTF, OBJ, STL by Assimp, in the file's own axes. The scene graph is flattened; the
+/// nodes' names stay.
+FileScene read_assimp(const std::filesystem::path& file);
 
 /// ASCII or binary PLY of either byte order: faces if it has any, otherwise a cloud. The properties
 /// class, object and reflectivity of the faces that `arex world` writes are understood.
@@ -25,8 +25,8 @@ FileScene read_pcd(const std::filesystem::path& file);
 /// OctoMap's .bt and .ot: the occupied cells.
 FileScene read_octree(const std::filesystem::path& file);
 
-/// A Gazebo world or model by libsdformat. What is seen is what is felt: the visuals; a link without
-/// visuals stands for its collisions. The poses of a saved <state> hold.
+/// A Gazebo world or model by libsdformat. What is seen is what is felt: the visuals; a link
+/// without visuals stands for its collisions. The poses of a saved <state> hold.
 /// @param model_paths where model:// is looked for, after the file's own folder and its parents
 FileScene read_sdf(const std::filesystem::path& file,
                    const std::vector<std::filesystem::path>& model_paths);

@@ -16,8 +16,8 @@ namespace arex::worlds {
 struct FileGroup {
   std::string name;      ///< of the node or model, as the file has it
   std::string material;  ///< may be empty
-  std::string shape;     ///< mesh, box, cylinder, sphere, capsule, ellipsoid, plane, heightmap, voxels
-  int surface_class = -1;     ///< where the file itself tells (our own PLY); otherwise negative
+  std::string shape;  ///< mesh, box, cylinder, sphere, capsule, ellipsoid, plane, heightmap, voxels
+  int surface_class = -1;    ///< where the file itself tells (our own PLY); otherwise negative
   double reflectivity = -1;  ///< likewise
 };
 

@@ -30,7 +30,7 @@ Pose pose_of(const ignition::math::Pose3d& X) {
 class Resolver {
  public:
   Resolver(const fs::path& file, const std::vector<fs::path>& model_paths) {
-    for (fs::path folder = fs::absolute(file).parent_path(); ; folder = folder.parent_path()) {
+    for (fs::path folder = fs::absolute(file).parent_path();; folder = folder.parent_path()) {
       folders_.push_back(folder);
       if (folder == folder.parent_path() || folders_.size() >= kAncestors) break;
     }
@@ -68,9 +68,8 @@ class SdfReader {
   FileScene read() {
     sdf::Console::Instance()->SetQuiet(true);
     sdf::ParserConfig config;
-    config.SetFindCallback([this](const std::string& uri) {
-      return resolver_.find(uri, file_).string();
-    });
+    config.SetFindCallback(
+        [this](const std::string& uri) { return resolver_.find(uri, file_).string(); });
     sdf::Root root;
     judge(root.Load(file_.string(), config));
     scene_.up = FileUp::kZ;
@@ -82,7 +81,8 @@ class SdfReader {
         const auto moved = moved_to_.find(model.Name());
         add(model, moved == moved_to_.end() ? pose_in_parent(model) : moved->second, "", 0);
       }
-      if (root.WorldCount() > 1) scene_.notes.emplace_back("holds several worlds, the first is read");
+      if (root.WorldCount() > 1)
+        scene_.notes.emplace_back("holds several worlds, the first is read");
     } else if (root.Model() != nullptr) {
       add(*root.Model(), pose_in_parent(*root.Model()), "", 0);
     } else {
@@ -97,7 +97,8 @@ class SdfReader {
   void judge(const sdf::Errors& errors) {
     for (const sdf::Error& error : errors) {
       const std::string text = error.Message();
-      if (error.Code() == sdf::ErrorCode::URI_LOOKUP || error.Code() == sdf::ErrorCode::URI_INVALID) {
+      if (error.Code() == sdf::ErrorCode::URI_LOOKUP ||
+          error.Code() == sdf::ErrorCode::URI_INVALID) {
         if (text.find("model://ground_plane") != std::string::npos) {
           stand_in_for_the_ground();
         } else if (text.find("model://sun") == std::string::npos) {
@@ -114,7 +115,8 @@ class SdfReader {
   void stand_in_for_the_ground() {
     const std::uint32_t group = add_group("ground_plane", "", "plane");
     add_plane({}, Vec3::UnitZ(), {100, 100}, group);
-    scene_.notes.emplace_back("model://ground_plane not found: 100 x 100 m of level ground instead");
+    scene_.notes.emplace_back(
+        "model://ground_plane not found: 100 x 100 m of level ground instead");
   }
 
   template <class T>
@@ -122,8 +124,8 @@ class SdfReader {
     ignition::math::Pose3d pose;
     const sdf::Errors errors = thing.SemanticPose().Resolve(pose);
     if (!errors.empty()) {
-      throw std::runtime_error(std::string("places a ") + what + " by an unknown frame: " +
-                               errors.front().Message());
+      throw std::runtime_error(std::string("places a ") + what +
+                               " by an unknown frame: " + errors.front().Message());
     }
     return pose_of(pose);
   }
@@ -193,13 +195,13 @@ class SdfReader {
       case sdf::GeometryType::BOX:
         return primitive("box", Kind::kBox, 0.5 * vector_of(geometry.BoxShape()->Size()));
       case sdf::GeometryType::CYLINDER:
-        return primitive("cylinder", Kind::kCylinder,
-                         {geometry.CylinderShape()->Radius(),
-                          0.5 * geometry.CylinderShape()->Length(), 0});
+        return primitive(
+            "cylinder", Kind::kCylinder,
+            {geometry.CylinderShape()->Radius(), 0.5 * geometry.CylinderShape()->Length(), 0});
       case sdf::GeometryType::CAPSULE:
-        return primitive("capsule", Kind::kCapsule,
-                         {geometry.CapsuleShape()->Radius(),
-                          0.5 * geometry.CapsuleShape()->Length(), 0});
+        return primitive(
+            "capsule", Kind::kCapsule,
+            {geometry.CapsuleShape()->Radius(), 0.5 * geometry.CapsuleShape()->Length(), 0});
       case sdf::GeometryType::SPHERE:
         return add_ball(Vec3::Constant(geometry.SphereShape()->Radius()), X_FP,
                         add_group(name, material, "sphere"));
@@ -229,9 +231,13 @@ class SdfReader {
 
   void add_plane(const Pose& X_FP, const Vec3& normal, const Vec2& size, std::uint32_t group) {
     const Quat turn = Quat::FromTwoVectors(Vec3::UnitZ(), normal);
+    constexpr double kMost = 500;  // a plane has no end; this is as much as anybody flies over
+    if (size.maxCoeff() > kMost) {
+      scene_.notes.push_back("a plane cut to " + std::to_string(static_cast<int>(kMost)) + " m");
+    }
     const auto first = static_cast<std::uint32_t>(scene_.vertices.size());
     for (const Vec2& corner : {Vec2(-1, -1), Vec2(1, -1), Vec2(1, 1), Vec2(-1, 1)}) {
-      const Vec2 p = 0.5 * size.cwiseProduct(corner);
+      const Vec2 p = 0.5 * size.cwiseMin(kMost).cwiseProduct(corner);
       scene_.vertices.push_back(X_FP * (turn * Vec3(p.x(), p.y(), 0)));
     }
     add_face(group, first, first + 1, first + 2);
@@ -253,7 +259,8 @@ class SdfReader {
     }
     for (std::uint32_t ring = 0; ring < kRings; ++ring) {
       for (std::uint32_t k = 0; k < kRound; ++k) {
-        const std::uint32_t a = first + ring * kRound + k, b = first + ring * kRound + (k + 1) % kRound;
+        const std::uint32_t a = first + ring * kRound + k,
+                            b = first + ring * kRound + (k + 1) % kRound;
         if (ring > 0) add_face(group, a, a + kRound, b);
         if (ring + 1 < kRings) add_face(group, b, a + kRound, b + kRound);
       }
@@ -269,9 +276,10 @@ class SdfReader {
     }
     const FileScene& part = mesh_of(file);
     const Vec3 scale = vector_of(mesh.Scale());
-    // Gazebo's axes are COLLADA's own only after its up axis has been made z.
+    // A link's z is the mesh's up axis.
     Mat3 R_zup = Mat3::Identity();
     if (part.up == FileUp::kY) R_zup << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+    if (part.up == FileUp::kX) R_zup << 0, 1, 0, 0, 0, 1, 1, 0, 0;
     const auto first = static_cast<std::uint32_t>(scene_.vertices.size());
     const auto first_group = static_cast<std::uint32_t>(scene_.groups.size());
     for (const Vec3& v : part.vertices) {
@@ -293,13 +301,14 @@ class SdfReader {
     std::transform(ending.begin(), ending.end(), ending.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     try {
-      place->second = ending == ".ply" ? read_ply(file) : read_assimp(file, false);
+      place->second = ending == ".ply" ? read_ply(file) : read_assimp(file);
     } catch (const std::exception& error) {
       throw std::runtime_error("names the mesh " + file.string() + ", which " + error.what());
     }
     for (const auto& corners : place->second.triangles) {
       for (const std::uint32_t corner : corners) {
-        if (corner >= place->second.vertices.size()) throw std::runtime_error("names a broken mesh");
+        if (corner >= place->second.vertices.size())
+          throw std::runtime_error("names a broken mesh");
       }
     }
     return place->second;
@@ -342,8 +351,8 @@ FileScene read_sdf(const fs::path& file, const std::vector<fs::path>& model_path
   return SdfReader(file, model_paths).read();
 }
 
-void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP,
-                      std::uint32_t group, FileScene& scene) {
+void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP, std::uint32_t group,
+                      FileScene& scene) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_file(&image, file.c_str()) == 0) {

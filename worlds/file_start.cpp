@@ -14,17 +14,17 @@
 namespace arex::worlds {
 namespace {
 
-constexpr double kResolution = 0.2;   // m; conservative cells make every gap narrower by this
-constexpr double kMostCells = 4e7;    // beyond, the cells grow
-constexpr double kHover = 0.8;        // where room is looked for, above the ground, m
-constexpr double kWanted = 0.7;       // room there that is as good as more, m
-constexpr double kLattice = 0.4;      // between the places that are tried, m
-constexpr double kFoot = 0.1;         // from the middle to a leg, along x and y, m
-constexpr double kUneven = 0.05;      // between the ground's heights under middle and legs, m
-constexpr double kOnGround = 0.3;     // a given height this far from the ground means it, m
-constexpr double kLevel = 0.7;        // cosine of the steepest ground to stand on
-constexpr double kFairShare = 0.1;    // of the free space that a start is to give access to
-constexpr double kLeastReach = 1.0;   // m^2 that can be reached, seen from above
+constexpr double kResolution = 0.2;  // m; conservative cells make every gap narrower by this
+constexpr double kMostCells = 4e7;   // beyond, the cells grow
+constexpr double kHover = 0.8;       // where room is looked for, above the ground, m
+constexpr double kWanted = 0.7;      // room there that is as good as more, m
+constexpr double kLattice = 0.4;     // between the places that are tried, m
+constexpr double kFoot = 0.1;        // from the middle to a leg, along x and y, m
+constexpr double kUneven = 0.05;     // between the ground's heights under middle and legs, m
+constexpr double kOnGround = 0.3;    // a given height this far from the ground means it, m
+constexpr double kLevel = 0.7;       // cosine of the steepest ground to stand on
+constexpr double kFairShare = 0.1;   // of the free space that a start is to give access to
+constexpr double kLeastReach = 1.0;  // m^2 that can be reached, seen from above
 
 using Corners = std::array<Vec3, 3>;
 
@@ -81,7 +81,8 @@ class Ground {
   void add(const Corners& v, std::uint32_t t) {
     const Vec3 low = v[0].cwiseMin(v[1]).cwiseMin(v[2]), high = v[0].cwiseMax(v[1]).cwiseMax(v[2]);
     for (int y = std::max(0, row(low.y())); y <= std::min(rows_ - 1, row(high.y())); ++y) {
-      for (int x = std::max(0, column(low.x())); x <= std::min(columns_ - 1, column(high.x())); ++x) {
+      for (int x = std::max(0, column(low.x())); x <= std::min(columns_ - 1, column(high.x()));
+           ++x) {
         members_[index(x, y)].push_back(t);
       }
     }
@@ -147,8 +148,8 @@ Space space_of(const World& world, double radius_m) {
 }
 
 bool stands_level(const Ground& ground, const Vec2& p, double z) {
-  for (const Vec2& leg : {Vec2(kFoot, kFoot), Vec2(-kFoot, kFoot), Vec2(kFoot, -kFoot),
-                          Vec2(-kFoot, -kFoot)}) {
+  for (const Vec2& leg :
+       {Vec2(kFoot, kFoot), Vec2(-kFoot, kFoot), Vec2(kFoot, -kFoot), Vec2(-kFoot, -kFoot)}) {
     const std::vector<double> heights = ground.heights(p + leg);
     if (std::none_of(heights.begin(), heights.end(),
                      [&](double h) { return std::abs(h - z) < kUneven; })) {
@@ -178,8 +179,8 @@ std::vector<Candidate> candidates(const World& world, const Ground& ground, cons
   const Bounds& bounds = world.bounds;
   // Those who make worlds to fly in put the vehicle at their origin.
   const Vec2 middle = 0.5 * (bounds.low + bounds.high).head<2>();
-  const bool has_origin = (bounds.low.head<2>().array() < 0).all() &&
-                          (bounds.high.head<2>().array() > 0).all();
+  const bool has_origin =
+      (bounds.low.head<2>().array() < 0).all() && (bounds.high.head<2>().array() > 0).all();
   const Vec2 wanted = has_origin ? Vec2(0, 0) : middle;
   std::vector<Candidate> found;
   const Vec2 first = ((bounds.low.head<2>() - wanted) / kLattice).array().ceil();
@@ -222,8 +223,10 @@ FoundStart search(const World& world, const Ground& ground, Space& space, double
     best = candidate.p;
     if (static_cast<double>(volume) > kFairShare * static_cast<double>(space.passable)) break;
   }
-  if (!best) throw ConfigError("holds no place to start from: level, with room around and above it");
-  return {{so3::from_yaw(yaw_rad), *best}, room_at(world, *best + 0.5 * Vec3::UnitZ(), best->z()), {}};
+  if (!best)
+    throw ConfigError("holds no place to start from: level, with room around and above it");
+  return {
+      {so3::from_yaw(yaw_rad), *best}, room_at(world, *best + 0.5 * Vec3::UnitZ(), best->z()), {}};
 }
 
 [[noreturn]] void refuse(const std::string& start, const char* format, double value) {
@@ -236,12 +239,13 @@ FoundStart given(const World& world, const Ground& ground, const FileStart& star
                  double radius_m) {
   const Vec2 p(start.position_m[0], start.position_m[1]);
   const std::vector<double> heights = ground.heights(p);
-  std::string name = "[" + config_detail::format_scalar(p.x()) + ", " +
-                     config_detail::format_scalar(p.y());
+  std::string name =
+      "[" + config_detail::format_scalar(p.x()) + ", " + config_detail::format_scalar(p.y());
   const bool has_height = start.position_m.size() == 3;
   if (has_height) name += ", " + config_detail::format_scalar(start.position_m[2]);
   name += "]";
-  if (heights.empty()) throw ConfigError("file.start.position_m " + name + " has no ground below it");
+  if (heights.empty())
+    throw ConfigError("file.start.position_m " + name + " has no ground below it");
   double best = std::nan(""), best_room = -1;
   if (has_height) {
     const double z = start.position_m[2];
@@ -249,7 +253,8 @@ FoundStart given(const World& world, const Ground& ground, const FileStart& star
       if (!(std::abs(h - z) >= std::abs(best - z))) best = h;
     }
     if (std::abs(best - z) > kOnGround) {
-      refuse(name, best < z ? "is in the air, %.2f m above the ground" : "is %.2f m below the ground",
+      refuse(name,
+             best < z ? "is in the air, %.2f m above the ground" : "is %.2f m below the ground",
              std::abs(best - z));
     }
     best_room = room_at(world, {p.x(), p.y(), best + 0.5}, best);
@@ -285,9 +290,8 @@ double area_of(const FreeSpace& free) {
 FoundStart find_start(const World& world, const FileStart& start, double vehicle_radius_m) {
   const Ground ground(world);
   Space space = space_of(world, vehicle_radius_m);
-  FoundStart found = start.position_m.empty()
-                         ? search(world, ground, space, start.yaw_rad)
-                         : given(world, ground, start, vehicle_radius_m);
+  FoundStart found = start.position_m.empty() ? search(world, ground, space, start.yaw_rad)
+                                              : given(world, ground, start, vehicle_radius_m);
   found.free = std::move(space.free);
   std::fill(found.free.reachable.begin(), found.free.reachable.end(), std::uint8_t{0});
   const Eigen::Vector3i cell = cell_above(found.free, found.X_WS.p);

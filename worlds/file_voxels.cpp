@@ -188,7 +188,8 @@ void mesh_voxels(FileScene& scene, double voxel_m, int least_points) {
   scene.voxels = {};
   scene.points = {};
   scene.voxel_m = side;
-  const FileGroup group = scene.groups.empty() ? FileGroup{"voxels", "", "voxels"} : scene.groups[0];
+  const FileGroup group =
+      scene.groups.empty() ? FileGroup{"voxels", "", "voxels"} : scene.groups[0];
   scene.groups.assign(1, group);
   FaceMesher mesher(box, side, scene);
   for (int axis = 0; axis < 3; ++axis) {

@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -22,14 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLargest = 2000;         // m; a garage of 5 km has other units than were thought
-constexpr double kFarthest = 1e5;         // m from the origin: single precision has 8 mm there
+constexpr double kLargest = 2000;  // m; a garage of 5 km has other units than were thought
+constexpr double kFarthest = 1e5;  // m from the origin: single precision has 8 mm there
 constexpr double kMostFileBytes = 2e9;
 constexpr std::size_t kMostTriangles = 20'000'000;
-constexpr double kHeadroom = 3.0;         // of air above the highest surface, m
-constexpr double kLevel = 0.7;            // |n.z| of what may be floor or ceiling
-constexpr double kFlat = 0.97;            // |n.z| of a floor that is no ramp: 14 degrees
-constexpr int kRound = 32;                // sides of what is round
+constexpr double kHeadroom = 3.0;  // of air above the highest surface, m
+constexpr double kLevel = 0.7;     // |n.z| of what may be floor or ceiling
+constexpr double kFlat = 0.97;     // |n.z| of a floor that is no ramp: 14 degrees
+constexpr int kRound = 32;         // sides of what is round
 
 std::string text_of(const char* format, ...) __attribute__((format(printf, 1, 2)));
 std::string text_of(const char* format, ...) {
@@ -57,7 +58,7 @@ FileScene read_scene(const FileRecipe& recipe, const std::string& ending) {
   if (ending == "sdf" || ending == "world") {
     return read_sdf(file, {recipe.model_paths.begin(), recipe.model_paths.end()});
   }
-  return read_assimp(file, recipe.up != FileUpAxis::kAuto);
+  return read_assimp(file);
 }
 
 double size_of(const fs::path& file) {
@@ -75,11 +76,12 @@ FileScene read_contained(const FileRecipe& recipe, const std::string& ending) {
   static constexpr std::array<std::string_view, 11> kEndings{
       "ply", "stl", "obj", "dae", "gltf", "glb", "sdf", "world", "bt", "ot", "pcd"};
   if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
-    throw ConfigError("is of no kind that can be read: .ply .stl .obj .dae .gltf .glb .sdf .world "
-                      ".bt .ot .pcd");
+    throw ConfigError(
+        "is of no kind that can be read: .ply .stl .obj .dae .gltf .glb .sdf .world "
+        ".bt .ot .pcd");
   }
   ContainedLimits limits;
-  limits.cpu_s = 10 + size_of(recipe.path) / 1e6;
+  limits.cpu_s = 3 + size_of(recipe.path) / 1e6;
   return FileScene::unpack(
       run_contained([&] { return read_scene(recipe, ending).pack(); }, limits));
 }
@@ -90,6 +92,43 @@ Mat3 upright(FileUp up) {
   if (up == FileUp::kY) R << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   if (up == FileUp::kX) R << 0, 1, 0, 0, 0, 1, 1, 0, 0;
   return R;
+}
+
+/// How much of a scene is level if this axis points up: area, m^2, and height, m.
+struct Levelness {
+  double area = 0;
+  double height = 0;
+};
+
+Levelness levelness(const FileScene& scene, Eigen::Index axis) {
+  Levelness out;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const auto& [a, b, c] : scene.triangles) {
+    const Vec3 &p = scene.vertices[a], &q = scene.vertices[b], &r = scene.vertices[c];
+    const Vec3 area = 0.5 * (q - p).cross(r - p);
+    if (std::abs(area[axis]) > kLevel * area.norm()) out.area += area.norm();
+    low = std::min({low, p[axis], q[axis], r[axis]});
+    high = std::max({high, p[axis], q[axis], r[axis]});
+  }
+  out.height = high - low;
+  return out;
+}
+
+/// Many a COLLADA or OBJ file has other axes than it says, for Gazebo and others do not ask. Where
+/// its surfaces lie level the other way round, and it would stand on its edge, they are believed.
+FileUp believed_up(FileUp up, bool primitives, const FileScene& scene, std::string& note) {
+  if (primitives || (up != FileUp::kY && up != FileUp::kZ)) return up;
+  const Eigen::Index said = up == FileUp::kY ? 1 : 2, other = up == FileUp::kY ? 2 : 1;
+  const Levelness as_said = levelness(scene, said), as_other = levelness(scene, other);
+  constexpr double kClearly = 3;
+  const bool doubtful =
+      as_other.area > kClearly * as_said.area && as_said.height > kClearly * as_other.height;
+  if (!doubtful) return up;
+  note = text_of(
+      "%c is taken as up, for along %c it would be %.0f m high and hardly level anywhere; "
+      "see file.up",
+      said == 1 ? 'z' : 'y', said == 1 ? 'y' : 'z', as_said.height);
+  return said == 1 ? FileUp::kZ : FileUp::kY;
 }
 
 /// Into W. What stands in the file is checked here for the first time.
@@ -218,24 +257,26 @@ void add_primitive(MeshBuilder& builder, const FilePrimitive& primitive, std::ui
 
 bool is_degenerate(const FilePrimitive& primitive) {
   const bool box = primitive.kind == FilePrimitive::Kind::kBox;
-  const double least = box ? primitive.size.minCoeff()
-                           : std::min(primitive.size.x(), primitive.size.y());
+  const double least =
+      box ? primitive.size.minCoeff() : std::min(primitive.size.x(), primitive.size.y());
   return !(least > 1e-6);
 }
 
 void expect_fair_extent(const Bounds& bounds) {
   const Vec3 size = bounds.high - bounds.low;
-  if (bounds.low.cwiseAbs().maxCoeff() > kFarthest || bounds.high.cwiseAbs().maxCoeff() > kFarthest) {
-    throw ConfigError(text_of("lies around (%.0f, %.0f, %.0f) m, expected within %.0e m of its "
-                              "origin: see file.offset_m",
-                              0.5 * (bounds.low.x() + bounds.high.x()),
-                              0.5 * (bounds.low.y() + bounds.high.y()),
-                              0.5 * (bounds.low.z() + bounds.high.z()), kFarthest));
+  if (bounds.low.cwiseAbs().maxCoeff() > kFarthest ||
+      bounds.high.cwiseAbs().maxCoeff() > kFarthest) {
+    throw ConfigError(
+        text_of("lies around (%.0f, %.0f, %.0f) m, expected within %.0e m of its "
+                "origin: see file.offset_m",
+                0.5 * (bounds.low.x() + bounds.high.x()), 0.5 * (bounds.low.y() + bounds.high.y()),
+                0.5 * (bounds.low.z() + bounds.high.z()), kFarthest));
   }
   if (size.maxCoeff() > kLargest) {
-    throw ConfigError(text_of("is %.4g x %.4g x %.4g m large, expected at most %.0f: has it other "
-                              "units? See file.scale",
-                              size.x(), size.y(), size.z(), kLargest));
+    throw ConfigError(
+        text_of("is %.4g x %.4g x %.4g m large, expected at most %.0f: has it other "
+                "units? See file.scale",
+                size.x(), size.y(), size.z(), kLargest));
   }
 }
 
@@ -309,8 +350,8 @@ class FormClasses {
 
   [[nodiscard]] bool is_open(const Vec3& p, double direction) const {
     for (const double cells : {0.75, 1.25, 1.75, 2.25}) {
-      const Eigen::Vector3i cell = air_.grid.cell_of(
-          p + direction * cells * air_.grid.resolution_m * Vec3::UnitZ());
+      const Eigen::Vector3i cell =
+          air_.grid.cell_of(p + direction * cells * air_.grid.resolution_m * Vec3::UnitZ());
       if (air_.grid.contains(cell) && air_.reachable[air_.grid.index(cell)]) return true;
     }
     return false;
@@ -377,7 +418,12 @@ FileWorld load(const FileRecipe& recipe, double vehicle_radius_m) {
   check_indices(scene);
   out.up_assumed = recipe.up == FileUpAxis::kAuto && scene.up == FileUp::kUnknown;
   FileUp up = scene.up == FileUp::kUnknown ? FileUp::kZ : scene.up;
-  if (recipe.up != FileUpAxis::kAuto) up = static_cast<FileUp>(static_cast<int>(recipe.up));
+  std::string doubt;
+  if (recipe.up != FileUpAxis::kAuto) {
+    up = static_cast<FileUp>(static_cast<int>(recipe.up));
+  } else if (scene.voxel_m == 0) {
+    up = believed_up(up, !scene.primitives.empty(), scene, doubt);
+  }
   out.up = enum_names(FileUpAxis{})[static_cast<std::size_t>(up)];
   place(recipe, up, scene);
   out.dropped = drop_slivers(scene);
@@ -386,6 +432,7 @@ FileWorld load(const FileRecipe& recipe, double vehicle_radius_m) {
   }
   out.unit_m = scene.unit_m;
   out.notes = std::exchange(scene.notes, {});
+  if (!doubt.empty()) out.notes.push_back(doubt);
   std::vector<bool> named;
   out.world = build(recipe, scene, named);
   scene = {};
@@ -417,10 +464,10 @@ FileWorld load_file_world(const FileRecipe& recipe, double vehicle_radius_m) {
 std::string describe(const FileWorld& loaded) {
   const World& world = loaded.world;
   const Vec3 low = world.bounds.low, high = world.bounds.high;
-  std::string text = text_of("%s: %zu triangles, %zu objects, %zu collision shapes; z up from %s%s\n",
-                             loaded.format.c_str(), world.mesh.triangles.size(),
-                             world.objects.size(), world.collision_shapes.size(),
-                             loaded.up.c_str(), loaded.up_assumed ? " (assumed)" : "");
+  std::string text = text_of(
+      "%s: %zu triangles, %zu objects, %zu collision shapes; z up from %s%s\n",
+      loaded.format.c_str(), world.mesh.triangles.size(), world.objects.size(),
+      world.collision_shapes.size(), loaded.up.c_str(), loaded.up_assumed ? " (assumed)" : "");
   text += text_of("extent: %.2f x %.2f x %.2f m, from (%.2f, %.2f, %.2f)\n", high.x() - low.x(),
                   high.y() - low.y(), high.z() - low.z(), low.x(), low.y(), low.z());
   text += "classes:";
@@ -434,11 +481,12 @@ std::string describe(const FileWorld& loaded) {
                   X.p.y(), X.p.z(), std::atan2(X.R(1, 0), X.R(0, 0)),
                   loaded.start_found ? "found" : "given", loaded.start_room_m >= 2 ? "over " : "",
                   loaded.start_room_m);
-  text += text_of("reachable: %.1f m^2 seen from above, %.1f m^3, from (%.2f, %.2f, %.2f) to "
-                  "(%.2f, %.2f, %.2f)\n",
-                  loaded.reachable_m2, loaded.reachable_m3, loaded.reachable.low.x(),
-                  loaded.reachable.low.y(), loaded.reachable.low.z(), loaded.reachable.high.x(),
-                  loaded.reachable.high.y(), loaded.reachable.high.z());
+  text += text_of(
+      "reachable: %.1f m^2 seen from above, %.1f m^3, from (%.2f, %.2f, %.2f) to "
+      "(%.2f, %.2f, %.2f)\n",
+      loaded.reachable_m2, loaded.reachable_m3, loaded.reachable.low.x(), loaded.reachable.low.y(),
+      loaded.reachable.low.z(), loaded.reachable.high.x(), loaded.reachable.high.y(),
+      loaded.reachable.high.z());
   if (loaded.dropped > 0) {
     text += text_of("note: %zu faces without area left out\n", loaded.dropped);
   }

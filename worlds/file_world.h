@@ -72,11 +72,11 @@ struct FileRecipe {
 struct FileWorld {
   World world;
 
-  std::string format;       ///< by its ending: dae, world, ...
-  double unit_m = 1;        ///< that the file names
-  std::string up;           ///< axis of the file
-  bool up_assumed = false;  ///< nothing said so
-  std::size_t dropped = 0;  ///< triangles without area
+  std::string format;        ///< by its ending: dae, world, ...
+  double unit_m = 1;         ///< that the file names
+  std::string up;            ///< axis of the file
+  bool up_assumed = false;   ///< nothing said so
+  std::size_t dropped = 0;   ///< triangles without area
   bool start_found = false;  ///< not given
   double start_room_m = 0;   ///< from the standing vehicle's middle to what is not ground
   Bounds reachable;          ///< what a vehicle's centre can get to from the start, its extent

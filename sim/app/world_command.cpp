@@ -97,6 +97,14 @@ void check_size(const ConfigNode& root, const worlds::World& world, double resol
   config_detail::fail(config_detail::locate_rule(root, text.data()), text.data());
 }
 
+/// Nobody asked for a resolution: one that a large world can be written in.
+void coarsen(const worlds::World& world, worlds::ExportConfig& exported) {
+  constexpr double kFew = 1e8;
+  const double volume = (world.bounds.high - world.bounds.low).prod();
+  const double least = std::cbrt(volume / kFew);
+  if (least > exported.resolution_m) exported.resolution_m = std::ceil(20 * least) / 20;
+}
+
 // What a run has there would be half replaced.
 void expect_no_run(const std::filesystem::path& folder) {
   for (const char* name : {"resolved.yaml", "sweep.json"}) {
@@ -129,6 +137,7 @@ int world(const WorldArguments& arguments) {
   for (const std::string_view file : worlds::kExportedFiles) check_writable(folder.path() / file);
   if (from_file) check_writable(folder.path() / kOverview);
   const worlds::FileWorld built = build(root, recipe, direct);
+  if (direct && !root.find("export")) coarsen(built.world, recipe.exported);
   check_size(root, built.world, recipe.exported.resolution_m);
   worlds::export_world(built.world, recipe.exported, arguments.out);
   if (from_file) {

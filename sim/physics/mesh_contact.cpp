@@ -15,9 +15,9 @@ using worlds::CollisionShape;
 
 constexpr double kRounding = 0.004;  // of edges and rims, m
 constexpr int kRimPoints = 16;
-constexpr double kSame = 1e-6;       // m: one place
+constexpr double kSame = 1e-6;        // m: one place
 constexpr double kOneContact = 1e-3;  // m: two places of a shape that one contact stands for
-constexpr double kBack = 1e-6;       // share of the way that the middle keeps off a triangle
+constexpr double kBack = 1e-6;        // share of the way that the middle keeps off a triangle
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
 /// Where along the segment from a to b it passes through a triangle, as a share of its length;
@@ -62,8 +62,7 @@ void add_rim(std::vector<Vec3>& points, std::vector<std::array<std::uint32_t, 2>
 
 }  // namespace
 
-MeshContacts::MeshContacts(const worlds::World& world,
-                           const std::vector<CollisionShape>& airframe)
+MeshContacts::MeshContacts(const worlds::World& world, const std::vector<CollisionShape>& airframe)
     : world_(world), airframe_(airframe), tree_(world) {
   for (const CollisionShape& shape : airframe) skeletons_.push_back(skeleton_of(shape));
 }
@@ -151,9 +150,8 @@ void MeshContacts::gather(const Eigen::AlignedBox3d& box) {
       face.corners[k] = world_.mesh.vertices[corners[k]].cast<double>();
       face.box.extend(face.corners[k]);
     }
-    face.normal = (face.corners[1] - face.corners[0])
-                      .cross(face.corners[2] - face.corners[0])
-                      .normalized();
+    face.normal =
+        (face.corners[1] - face.corners[0]).cross(face.corners[2] - face.corners[0]).normalized();
   }
 }
 
@@ -217,8 +215,7 @@ void MeshContacts::touch_point(std::uint32_t shape, const Vec3& p, bool& behind)
     if (!(distance < radius) || distance == 0) continue;
     if (!is_nearest(p, q, distance)) continue;
     const Vec3 normal = (p - q) / distance;
-    add({shape, face.triangle, q + 0.5 * (distance - radius) * normal, normal,
-         radius - distance});
+    add({shape, face.triangle, q + 0.5 * (distance - radius) * normal, normal, radius - distance});
   }
 }
 
@@ -302,8 +299,7 @@ void MeshContacts::touch_corners(std::uint32_t shape, const Pose& X_WB) {
 
 // Not nearest: another triangle that holds the same place comes closer elsewhere. So the edges
 // within a surface, flat or hollow, are left to the triangles beside them.
-bool MeshContacts::is_nearest(const Vec3& on_skeleton, const Vec3& on_face,
-                              double distance) const {
+bool MeshContacts::is_nearest(const Vec3& on_skeleton, const Vec3& on_face, double distance) const {
   const Vec3 slack = Vec3::Constant(kSame);
   for (const Face& face : faces_) {
     if (!face.box.intersects({on_face - slack, on_face + slack})) continue;

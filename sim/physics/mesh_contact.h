@@ -78,7 +78,8 @@ class MeshContacts {
   void touch_rim(std::uint32_t shape, const Pose& X_WB);
   void touch_edge(std::uint32_t shape, const Vec3& a, const Vec3& b);
   void touch_corners(std::uint32_t shape, const Pose& X_WB);
-  [[nodiscard]] bool is_nearest(const Vec3& on_skeleton, const Vec3& on_face, double distance) const;
+  [[nodiscard]] bool is_nearest(const Vec3& on_skeleton, const Vec3& on_face,
+                                double distance) const;
   void add(MeshTouch touch);
   void thin_out();
 

@@ -133,6 +133,7 @@ std::vector<Target> all_targets() {
           {"requirement", read_requirement},
           {"batch", read_batch},
           {"sweep folder", read_sweep_folder},
+          {"world file", read_world_file},
           {"scenario, too", read_scenario}};
 }
 

@@ -48,7 +48,8 @@ std::string floats(const Vec3f& p) {
 }
 
 std::string pcd_header(std::size_t points, const char* data) {
-  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 "
+  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 "
+         "1 "
          "1\nWIDTH " +
          std::to_string(points) + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
          std::to_string(points) + "\nDATA " + data + "\n";
@@ -67,7 +68,8 @@ std::string lzf(const std::string& raw) {
 
 std::map<std::string, std::string> files_of(const std::vector<Vec3f>& points) {
   std::map<std::string, std::string> files;
-  std::string ascii = pcd_header(points.size(), "ascii"), binary = pcd_header(points.size(), "binary");
+  std::string ascii = pcd_header(points.size(), "ascii"),
+              binary = pcd_header(points.size(), "binary");
   std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex " +
                     std::to_string(points.size()) +
                     "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";

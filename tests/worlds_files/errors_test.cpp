@@ -29,8 +29,9 @@ TEST_F(FileErrors, WhatIsNoFile) {
 }
 
 TEST_F(FileErrors, WhatHoldsNothing) {
-  expect(said("x.ply", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float "
-                       "y\nproperty float z\nend_header\n"),
+  expect(said("x.ply",
+              "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n"),
          "no faces");
   expect(said("x.sdf", "<sdf version='1.6'><world name='w'/></sdf>"), "no faces");
   EXPECT_NE(said("x.obj", "# nothing\n"), "");
@@ -45,8 +46,7 @@ TEST_F(FileErrors, NumbersThatAreNone) {
 }
 
 TEST_F(FileErrors, UnitsThatCannotBe) {
-  const auto inches =
-      test::mapped(test::room(), [](const Vec3& p) { return 1000 * p; });
+  const auto inches = test::mapped(test::room(), [](const Vec3& p) { return 1000 * p; });
   expect(said("x.stl", test::stl_binary(inches)), "6000 x 5000");
   expect(said("y.stl", test::stl_binary(inches)), "file.scale");
   const auto utm =
@@ -82,16 +82,20 @@ TEST_F(FileErrors, DamagedFilesAreOneLine) {
   const auto parts = test::room();
   std::string ply = test::ply(parts, test::PlyKind::kBig);
   expect(said("cut.ply", ply.substr(0, ply.size() - 40)), "ends before its data does");
-  expect(said("word.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
-                          "float y\nproperty float z\nend_header\n1 2 3\n1 b 3\n"),
+  expect(said("word.ply",
+              "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
+              "float y\nproperty float z\nend_header\n1 2 3\n1 b 3\n"),
          "where a number is expected");
-  expect(said("many.ply", "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float "
-                          "x\nend_header\n1\n"),
+  expect(said("many.ply",
+              "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float "
+              "x\nend_header\n1\n"),
          "ends before its data does");
-  expect(said("x.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1000000000\n"
-                       "HEIGHT 1\nPOINTS 1000000000\nDATA binary\nabc"),
+  expect(said("x.pcd",
+              "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1000000000\n"
+              "HEIGHT 1\nPOINTS 1000000000\nDATA binary\nabc"),
          "ends before its data does");
-  EXPECT_NE(said("x.bt", "# Octomap OcTree binary file\nid OcTree\nsize 100\nres 0.1\ndata\nzz"), "");
+  EXPECT_NE(said("x.bt", "# Octomap OcTree binary file\nid OcTree\nsize 100\nres 0.1\ndata\nzz"),
+            "");
   EXPECT_NE(said("x.gltf", "{\"asset\":"), "");
   EXPECT_NE(said("x.dae", "<COLLADA><library_geom"), "");
   EXPECT_NE(said("x.world", "<sdf version='1.6'><world"), "");

@@ -12,9 +12,9 @@ namespace arex::worlds {
 namespace {
 
 using arex::test::TemporaryFolder;
+using Eigen::Matrix4d;
 using test::mapped;
 using test::room;
-using Eigen::Matrix4d;
 
 /// From W's axes to those of a file whose `up` points up.
 Vec3 with_up(char up, const Vec3& p) {
@@ -74,8 +74,8 @@ TEST(FileMeshes, ColladaNamesItsUnitsAxesAndNodes) {
   X.topLeftCorner<3, 3>() = 2 * so3::Exp({0.3, -0.5, 1.1});  // a node that turns, scales, moves
   X.topRightCorner<3, 1>() = Vec3(3, -7, 11);
   const Matrix4d X_inverse = X.inverse();
-  for (const auto& [axis, up] : {std::pair("Z_UP", 'z'), std::pair("Y_UP", 'y'),
-                                 std::pair("X_UP", 'x')}) {
+  for (const auto& [axis, up] :
+       {std::pair("Z_UP", 'z'), std::pair("Y_UP", 'y'), std::pair("X_UP", 'x')}) {
     for (const double unit : {1.0, 0.0254, 0.01}) {
       SCOPED_TRACE(axis);
       SCOPED_TRACE(unit);

@@ -64,8 +64,8 @@ std::vector<Sides> fingerprints(const std::vector<std::array<Vec3, 3>>& triangle
   for (const auto& v : triangles) {
     const Vec3 middle = (v[0] + v[1] + v[2]) / 3;
     const Vec3 area = 0.5 * (v[1] - v[0]).cross(v[2] - v[0]);
-    out.push_back({middle.x(), middle.y(), middle.z(), area.norm(), std::abs(area.x()),
-                   std::abs(area.z())});
+    out.push_back(
+        {middle.x(), middle.y(), middle.z(), area.norm(), std::abs(area.x()), std::abs(area.z())});
   }
   return out;
 }
@@ -200,7 +200,8 @@ std::string collada(const std::vector<Part>& parts, const std::string& up_axis, 
     out << "</float_array><technique_common><accessor source=\"#" << id << "a\" count=\""
         << part.vertices.size()
         << "\" stride=\"3\"><param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/>"
-           "<param name=\"Z\" type=\"float\"/></accessor></technique_common></source><vertices id=\""
+           "<param name=\"Z\" type=\"float\"/></accessor></technique_common></source><vertices "
+           "id=\""
         << id << "v\"><input semantic=\"POSITION\" source=\"#" << id
         << "p\"/></vertices><triangles count=\"" << part.triangles.size() << "\" material=\""
         << part.material << "\"><input semantic=\"VERTEX\" source=\"#" << id

@@ -39,8 +39,7 @@ TEST(Sdf, PrimitivesStandWhereTheirPosesSay) {
   const TemporaryFolder folder;
   test::write_file(
       folder / "x.world",
-      world_of(kPlane +
-               model("box", "5 -3 0.5 0 0 0.5", "<box><size>1 2 1</size></box>") +
+      world_of(kPlane + model("box", "5 -3 0.5 0 0 0.5", "<box><size>1 2 1</size></box>") +
                model("rod", "-6 4 1 0.3 0 0",
                      "<cylinder><radius>0.25</radius><length>3</length></cylinder>") +
                model("ball", "8 8 1 0 0 0", "<sphere><radius>0.75</radius></sphere>") +
@@ -90,7 +89,8 @@ TEST(Sdf, NestedPosesAndFramesMultiply) {
           "<model name='outer'><static>1</static><pose>1 2 0 0 0 1.5</pose>"
           "<frame name='f'><pose>0 1 0 0 0 0.25</pose></frame>"
           "<model name='inner'><pose relative_to='f'>2 0 0.5 0 0 0.2</pose>"
-          "<link name='a'><pose>0.5 0 0 0 0 0.1</pose><visual name='v'><pose>0 0.25 0 0.4 0 0</pose>"
+          "<link name='a'><pose>0.5 0 0 0 0 0.1</pose><visual name='v'><pose>0 0.25 0 0.4 0 "
+          "0</pose>"
           "<geometry><box><size>0.5 0.6 0.7</size></box></geometry></visual></link></model>"
           "<link name='base'/></model></world></sdf>");
   const World world = test::load(folder / "x.sdf");
@@ -116,14 +116,15 @@ TEST(Sdf, IncludesAndMeshesAreFoundAlongThePath) {
                    "<model><name>tower</name><sdf version='1.6'>model.sdf</sdf></model>");
   test::write_file(folder / "elsewhere/tower/model.sdf", tower);
   // Centimetres, y up: as the mesh says.
-  const auto cm = test::mapped(
-      test::room(), [](const Vec3& p) { return 100 * Vec3(p.x(), p.z(), -p.y()); });
+  const auto cm =
+      test::mapped(test::room(), [](const Vec3& p) { return 100 * Vec3(p.x(), p.z(), -p.y()); });
   test::write_file(folder / "elsewhere/tower/meshes/room.dae",
                    test::collada(cm, "Y_UP", 0.01, Eigen::Matrix4d::Identity()));
-  test::write_file(folder / "worlds/x.world",
-                   world_of(kPlane + "<include><uri>model://tower</uri><name>t2</name><pose>3 -4 0 0 0 "
-                                     "1.5707963267948966</pose></include>"
-                                     "<include><uri>model://sun</uri></include>"));
+  test::write_file(
+      folder / "worlds/x.world",
+      world_of(kPlane + "<include><uri>model://tower</uri><name>t2</name><pose>3 -4 0 0 0 "
+                        "1.5707963267948966</pose></include>"
+                        "<include><uri>model://sun</uri></include>"));
   FileRecipe recipe = test::recipe_of(folder / "worlds/x.world");
   FileWorld without = load_file_world(recipe, test::kVehicleRadius);
   EXPECT_EQ(without.world.mesh.triangles.size(), 2U) << "the ground is left";
@@ -146,10 +147,11 @@ TEST(Sdf, IncludesAndMeshesAreFoundAlongThePath) {
 
 TEST(Sdf, ASavedStateMovesItsModels) {
   const TemporaryFolder folder;
-  test::write_file(folder / "x.world",
-                   world_of(kPlane + model("box", "5 5 0.5 0 0 0", "<box><size>1 1 1</size></box>") +
-                            "<state world_name='w'><model name='box'><pose frame=''>-4 2 0.5 0 0 "
-                            "0.7</pose></model></state>"));
+  test::write_file(
+      folder / "x.world",
+      world_of(kPlane + model("box", "5 5 0.5 0 0 0", "<box><size>1 1 1</size></box>") +
+               "<state world_name='w'><model name='box'><pose frame=''>-4 2 0.5 0 0 "
+               "0.7</pose></model></state>"));
   const auto boxes = shapes_of(test::load(folder / "x.world"), Kind::kBox);
   ASSERT_EQ(boxes.size(), 1U);
   EXPECT_TRUE(boxes[0].X_WS.p.isApprox(Vec3(-4, 2, 0.5)));
@@ -169,7 +171,9 @@ TEST(Sdf, HeightMapsAreTerrain) {
   const TemporaryFolder folder;
   constexpr std::uint32_t kSide = 65;
   std::vector<std::uint16_t> level(kSide * kSide);
-  const auto height = [](double u, double v) { return 0.5 + 0.25 * std::sin(5 * u) * std::cos(3 * v); };
+  const auto height = [](double u, double v) {
+    return 0.5 + 0.25 * std::sin(5 * u) * std::cos(3 * v);
+  };
   double most = 0;
   for (std::uint32_t row = 0; row < kSide; ++row) {
     for (std::uint32_t column = 0; column < kSide; ++column) {
@@ -183,15 +187,17 @@ TEST(Sdf, HeightMapsAreTerrain) {
   image.version = PNG_IMAGE_VERSION;
   image.width = image.height = kSide;
   image.format = PNG_FORMAT_LINEAR_Y;
-  ASSERT_NE(png_image_write_to_file(&image, (folder / "map.png").c_str(), 0, level.data(), 0, nullptr),
-            0);
+  ASSERT_NE(
+      png_image_write_to_file(&image, (folder / "map.png").c_str(), 0, level.data(), 0, nullptr),
+      0);
   const char* geometry =
       "<heightmap><uri>file://map.png</uri><size>40 20 6</size><pos>0 0 -1</pos></heightmap>";
   test::write_file(folder / "x.world", world_of(model("hills", "0 0 0 0 0 0", geometry)));
   const World world = test::load(folder / "x.world");
   ASSERT_EQ(world.mesh.triangles.size(), 2U * 64 * 64);
   for (const Vec3f& v : world.mesh.vertices) {
-    const double u = static_cast<double>(v.x()) / 40 + 0.5, w = static_cast<double>(v.y()) / 20 + 0.5;
+    const double u = static_cast<double>(v.x()) / 40 + 0.5,
+                 w = static_cast<double>(v.y()) / 20 + 0.5;
     EXPECT_NEAR(static_cast<double>(v.z()), 6 * 60000 * height(u, w) / most - 1, 1e-3);
   }
   EXPECT_EQ(world.class_of_triangle(0), SurfaceClass::kGround);

@@ -27,8 +27,8 @@ void expect_free_start(const FileWorld& loaded) {
   const Vec3 p = world.X_WS.p + Vec3(0, 0, 0.4);
   for (const auto& [a, b, c] : world.mesh.triangles) {
     const auto& v = world.mesh.vertices;
-    const Vec3 nearest = nearest_on_triangle(p, v[a].cast<double>(), v[b].cast<double>(),
-                                             v[c].cast<double>());
+    const Vec3 nearest =
+        nearest_on_triangle(p, v[a].cast<double>(), v[b].cast<double>(), v[c].cast<double>());
     ASSERT_GT((nearest - p).norm(), kVehicleRadius);
   }
 }
@@ -48,11 +48,13 @@ TEST(SharedWorlds, TheParkingGarageIsInInches) {
   expect_free_start(loaded);
 }
 
-TEST(SharedWorlds, TheMineIsYUp) {
+TEST(SharedWorlds, TheMineSaysThatYIsUpAndItIsNot) {
   const FileWorld loaded = load("pittsburgh_mine.dae");
   EXPECT_EQ(loaded.world.mesh.triangles.size() + loaded.dropped, 13834U);
   EXPECT_NEAR(extent(loaded.world).z(), 2.75, 0.01);
-  EXPECT_EQ(loaded.up, "y");
+  EXPECT_EQ(loaded.up, "z");
+  ASSERT_FALSE(loaded.notes.empty());
+  EXPECT_NE(loaded.notes[0].find("file.up"), std::string::npos);
   expect_free_start(loaded);
 }
 

@@ -20,10 +20,10 @@ double distance_to(const World& world, const Vec3& p) {
   double best = 1e9;
   for (const auto& [a, b, c] : world.mesh.triangles) {
     const auto& v = world.mesh.vertices;
-    best = std::min(best, (nearest_on_triangle(p, v[a].cast<double>(), v[b].cast<double>(),
-                                               v[c].cast<double>()) -
-                           p)
-                              .norm());
+    best = std::min(
+        best,
+        (nearest_on_triangle(p, v[a].cast<double>(), v[b].cast<double>(), v[c].cast<double>()) - p)
+            .norm());
   }
   return best;
 }

@@ -60,7 +60,7 @@ TEST(SharedWorlds, TheMineSaysThatYIsUpAndItIsNot) {
 
 TEST(SharedWorlds, TheForestOfCylinders) {
   const FileWorld loaded = load("forest_density01seed0.world");
-  EXPECT_EQ(loaded.world.collision_shapes.size(), 500U);
+  EXPECT_EQ(loaded.world.collision_shapes.size(), 250U);
   expect_free_start(loaded);
 }
 

@@ -280,14 +280,29 @@ void expect_fair_extent(const Bounds& bounds) {
   }
 }
 
+/// Gives each triangle corners of its own. A mesh that hangs together and is closed is taken for a
+/// solid by the depth renderer, which leaves out its far side; a hall is closed and flown in.
+void unshare(FileScene& scene) {
+  std::vector<Vec3> vertices;
+  vertices.reserve(3 * scene.triangles.size());
+  for (auto& corners : scene.triangles) {
+    for (std::uint32_t& corner : corners) {
+      vertices.push_back(scene.vertices[corner]);
+      corner = static_cast<std::uint32_t>(vertices.size() - 1);
+    }
+  }
+  scene.vertices = std::move(vertices);
+}
+
 /// The world but for its start; `named`: whether an object's class is known.
-World build(const FileRecipe& recipe, const FileScene& scene, std::vector<bool>& named) {
+World build(const FileRecipe& recipe, FileScene& scene, std::vector<bool>& named) {
   MeshBuilder builder;
   Objects objects(recipe, scene, builder);
   std::vector<std::uint32_t> object_of_triangle(scene.triangles.size());
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
     object_of_triangle[t] = objects.of(scene.group_of_triangle[t], true);
   }
+  unshare(scene);
   builder.add_mesh(scene.vertices, scene.triangles, object_of_triangle);
   for (const FilePrimitive& primitive : scene.primitives) {
     if (is_degenerate(primitive)) continue;

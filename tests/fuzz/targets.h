@@ -18,8 +18,4 @@ struct Target {
 };
 
 std::vector<Target> all_targets();
-
-/// Damages a mesh, Gazebo world, octree or cloud and builds the world of it.
-void read_world_file(const std::filesystem::path& folder, RandomStream& random);
-
 }  // namespace arex::test

@@ -213,6 +213,33 @@ std::vector<float> squared_distances(const OccupancyGrid& occupancy) {
   return distance;
 }
 
+std::size_t flood(FreeSpace& space, const Eigen::Vector3i& start) {
+  const GridGeometry& grid = space.grid;
+  if (!grid.contains(start)) return 0;
+  const std::size_t first = grid.index(start);
+  if (space.reachable[first] || !space.passable[first]) return 0;
+  std::vector<Eigen::Vector3i> open{start};
+  space.reachable[first] = 1;
+  std::size_t count = 1;
+  while (!open.empty()) {
+    const Eigen::Vector3i cell = open.back();
+    open.pop_back();
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const int step : {-1, 1}) {
+        Eigen::Vector3i next = cell;
+        next[axis] += step;
+        if (!grid.contains(next)) continue;
+        const std::size_t index = grid.index(next);
+        if (space.reachable[index] || !space.passable[index]) continue;
+        space.reachable[index] = 1;
+        ++count;
+        open.push_back(next);
+      }
+    }
+  }
+  return count;
+}
+
 FreeSpace flood_free_space(const OccupancyGrid& occupancy, const Vec3& start, double radius_m) {
   const GridGeometry& grid = occupancy.grid;
   FreeSpace space{grid, std::vector<std::uint8_t>(grid.cells(), 0),
@@ -227,25 +254,7 @@ FreeSpace flood_free_space(const OccupancyGrid& occupancy, const Vec3& start, do
                    [](std::uint8_t occupied) { return static_cast<std::uint8_t>(!occupied); });
   }
 
-  const Eigen::Vector3i start_cell = grid.cell_of(start);
-  if (!grid.contains(start_cell) || !space.passable[grid.index(start_cell)]) return space;
-  std::vector<Eigen::Vector3i> open{start_cell};
-  space.reachable[grid.index(start_cell)] = 1;
-  while (!open.empty()) {
-    const Eigen::Vector3i cell = open.back();
-    open.pop_back();
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const int step : {-1, 1}) {
-        Eigen::Vector3i next = cell;
-        next[axis] += step;
-        if (!grid.contains(next)) continue;
-        const std::size_t index = grid.index(next);
-        if (space.reachable[index] || !space.passable[index]) continue;
-        space.reachable[index] = 1;
-        open.push_back(next);
-      }
-    }
-  }
+  flood(space, grid.cell_of(start));
   return space;
 }
 

@@ -25,6 +25,8 @@ World build_unchecked(const WorldConfig& config, std::uint64_t seed) {
       return build_gaps(config.gaps, seed);
     case WorldKind::kEmpty:
       return build_empty(config.empty, seed);
+    case WorldKind::kFile:
+      break;
   }
   throw ConfigError("unknown kind of world");
 }
@@ -81,6 +83,9 @@ double reachable_share(const World& world, const Bounds& region, double radius_m
 }  // namespace
 
 World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m) {
+  if (config.kind == WorldKind::kFile) {
+    return load_file_world(config.file, vehicle_radius_m).world;
+  }
   World world = build_unchecked(config, seed);
   const double share = reachable_share(world, region_to_reach(config, world), vehicle_radius_m);
   if (share < kReachableShare) {
@@ -94,7 +99,18 @@ World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_
   return world;
 }
 
-Eigen::AlignedBox2d extent_of(const WorldConfig& config) {
+Eigen::AlignedBox2d extent_of(const FileWorld& loaded) {
+  const Pose X_SW = loaded.world.X_WS.inverse();
+  Eigen::AlignedBox2d box;
+  for (const double x : {loaded.reachable.low.x(), loaded.reachable.high.x()}) {
+    for (const double y : {loaded.reachable.low.y(), loaded.reachable.high.y()}) {
+      box.extend((X_SW * Vec3(x, y, loaded.world.X_WS.p.z())).head<2>());
+    }
+  }
+  return box;
+}
+
+std::optional<Eigen::AlignedBox2d> extent_of(const WorldConfig& config) {
   const auto centred = [](const Vec2& size) {
     return Eigen::AlignedBox2d(Vec2(-0.5 * size), Vec2(0.5 * size));
   };
@@ -102,15 +118,17 @@ Eigen::AlignedBox2d extent_of(const WorldConfig& config) {
     case WorldKind::kForest:
       return centred(config.forest.size_m);
     case WorldKind::kGarage:
-      return {Vec2(0, -0.5 * config.garage.width_m),
-              Vec2(config.garage.length_m, 0.5 * config.garage.width_m)};
+      return Eigen::AlignedBox2d(Vec2(0, -0.5 * config.garage.width_m),
+                                 Vec2(config.garage.length_m, 0.5 * config.garage.width_m));
     case WorldKind::kGaps: {
       const GapsRecipe& gaps = config.gaps;
-      return {Vec2(-gaps.start_radius_m, -0.5 * gaps.width_m),
-              Vec2(gaps.length_m - gaps.start_radius_m, 0.5 * gaps.width_m)};
+      return Eigen::AlignedBox2d(Vec2(-gaps.start_radius_m, -0.5 * gaps.width_m),
+                                 Vec2(gaps.length_m - gaps.start_radius_m, 0.5 * gaps.width_m));
     }
     case WorldKind::kEmpty:
       return centred(config.empty.size_m);
+    case WorldKind::kFile:
+      return {};
   }
   throw ConfigError("unknown kind of world");
 }

@@ -1,17 +1,19 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 
+#include "worlds/file_world.h"
 #include "worlds/forest.h"
 #include "worlds/gaps.h"
 #include "worlds/garage.h"
 
 namespace arex::worlds {
 
-enum class WorldKind { kForest, kGarage, kGaps, kEmpty };
-constexpr std::array<std::string_view, 4> enum_names(WorldKind) {
-  return {"forest", "garage", "gaps", "empty"};
+enum class WorldKind { kForest, kGarage, kGaps, kEmpty, kFile };
+constexpr std::array<std::string_view, 5> enum_names(WorldKind) {
+  return {"forest", "garage", "gaps", "empty", "file"};
 }
 
 /// The `world` section of a scenario: which recipe, and the recipes' parameters. Only the chosen
@@ -23,22 +25,30 @@ struct WorldConfig {
   GarageRecipe garage;
   GapsRecipe gaps;
   EmptyRecipe empty;
+  FileRecipe file;
 
   void fields(auto& f) {
-    f("kind", kind, "forest, garage, gaps or empty");
+    f("kind", kind, "forest, garage, gaps, empty or file");
     f("forest", forest, "recipe of kind forest");
     f("garage", garage, "recipe of kind garage");
     f("gaps", gaps, "recipe of kind gaps");
     f("empty", empty, "recipe of kind empty");
+    f("file", file, "what somebody else has made, for kind file");
+    f.check(kind != Kind::kFile || !file.path.empty(),
+            "file.path, a mesh, Gazebo world, octree or cloud");
   }
 };
 
-/// Builds the chosen world; a pure function of its arguments.
+/// Builds the chosen world; a pure function of its arguments, and of the file for kind file.
 /// @throws ConfigError (without FILE:LINE) if a vehicle of this radius cannot reach most of the
-/// free space from the start.
+/// free space from the start; of a file's world, hardly anything.
 World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m);
 
 /// Where there is ground to fly over, along x and y from the start, m: known without building.
-Eigen::AlignedBox2d extent_of(const WorldConfig& config);
+/// Nothing for a file, which has to be read.
+std::optional<Eigen::AlignedBox2d> extent_of(const WorldConfig& config);
+
+/// The same of a file's world: as far as a vehicle gets from its start.
+Eigen::AlignedBox2d extent_of(const FileWorld& loaded);
 
 }  // namespace arex::worlds

@@ -54,7 +54,10 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
 
 void add_world(CLI::App& app, WorldArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("world", "write a world: mesh, MJCF, ground-truth map");
-  command->add_option("recipe", arguments.file, "world recipe, or a scenario")->required();
+  command
+      ->add_option("recipe", arguments.file,
+                   "world recipe, scenario, or a mesh, Gazebo world, octree or cloud")
+      ->required();
   command->add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
   add_number(*command, "--seed", arguments.seed, kSeeds, "the seed of the world");

@@ -26,7 +26,11 @@ int params(const ScenarioArguments& arguments) {
 }
 
 int validate(const ScenarioArguments& arguments) {
-  const sim::Scenario scenario = load(arguments);
+  sim::Scenario scenario = load(arguments);
+  if (scenario.config.world.kind == worlds::WorldKind::kFile) {
+    scenario.file_world = scenario.read_file_world();
+    std::fputs(worlds::describe(*scenario.file_world).c_str(), stdout);
+  }
   const worlds::World world = scenario.build_world();
   std::printf("%s: valid; %zu objects, %zu triangles\n", arguments.file.c_str(),
               world.objects.size(), world.mesh.triangles.size());

@@ -73,47 +73,39 @@ bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& re
   return true;
 }
 
+/// What `build` gives; what it refuses is said with the place where the world was given.
+auto at_world(const ConfigNode& source, const auto& build) {
+  try {
+    return build();
+  } catch (const ConfigError& error) {
+    const ConfigNode* node = source.find("world");
+    throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
+  }
+}
+
+/// An absolute name for what `node` names.
+std::string resolved_path(const ConfigNode& node, const std::string& path) {
+  const bool from_command_line = node.where.starts_with("--");
+  const std::filesystem::path file = node.where.substr(0, node.where.rfind(':'));
+  const std::filesystem::path folder =
+      from_command_line ? std::filesystem::path() : file.parent_path();
+  return std::filesystem::absolute(folder / path).lexically_normal().string();
+}
+
 }  // namespace
 
-void DeviceSection::read(std::string_view name, const ConfigNode& section) {
-  const ConfigNode* named = section.find("type");
-  if (named) config_detail::parse_scalar(*named, "type", type);
-  if (type != "mid360" && type != "d430") {
-    throw ConfigError((named ? named->where : section.where) + ": device '" + std::string(name) +
-                      "' has the type '" + type + "', expected mid360 or d430");
+void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world) {
+  if (world.kind != worlds::WorldKind::kFile) return;
+  const ConfigNode* file = node.find("file");
+  if (file == nullptr) return;
+  if (const ConfigNode* path = file->find("path")) {
+    world.file.path = resolved_path(*path, world.file.path);
   }
-  own = section;
-  own.entries.clear();
-  for (const ConfigNode::Entry& entry : section.entries) {
-    if (entry.key == "position_m")
-      config_detail::read_value(entry.value, entry.key, mount.position_m);
-    else if (entry.key == "rotation_rad")
-      config_detail::read_value(entry.value, entry.key, mount.rotation_rad);
-    else if (entry.key != "type")
-      own.entries.push_back(entry);
+  const ConfigNode* folders = file->find("model_paths");
+  for (std::size_t i = 0; folders && i < folders->items.size(); ++i) {
+    std::string& folder = world.file.model_paths[i];
+    folder = resolved_path(folders->items[i], folder);
   }
-  if (type == "mid360") static_cast<void>(over(LidarConfig()));
-  if (type == "d430") static_cast<void>(over(DepthConfig()));
-}
-
-LidarConfig DeviceSection::over(LidarConfig first) const {
-  read_config(own, first);
-  return first;
-}
-
-DepthConfig DeviceSection::over(DepthConfig first) const {
-  read_config(own, first);
-  return first;
-}
-
-std::vector<ParameterInfo> DeviceSection::parameters() const {
-  std::vector<ParameterInfo> all{{"type", type, "", "mid360 or d430"}};
-  for (ParameterInfo& parameter : list_parameters(mount)) all.push_back(std::move(parameter));
-  for (ParameterInfo& parameter :
-       type == "mid360" ? given_parameters<LidarConfig>(own) : given_parameters<DepthConfig>(own)) {
-    all.push_back(std::move(parameter));
-  }
-  return all;
 }
 
 double ScenarioConfig::mapped_frames_hz() const {
@@ -133,13 +125,21 @@ double ScenarioConfig::mapped_frames_hz() const {
 
 std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
 
+std::shared_ptr<const worlds::FileWorld> Scenario::read_file_world() const {
+  if (file_world) return file_world;
+  return std::make_shared<worlds::FileWorld>(at_world(source, [&] {
+    return worlds::load_file_world(config.world.file, load_airframe().radius_m);
+  }));
+}
+
 worlds::World Scenario::build_world() const {
   worlds::World world;
-  try {
-    world = worlds::build_world(config.world, config.seed, load_airframe().radius_m);
-  } catch (const ConfigError& error) {
-    const ConfigNode* node = source.find("world");
-    throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
+  if (file_world) {
+    world = file_world->world;
+  } else {
+    world = at_world(source, [&] {
+      return worlds::build_world(config.world, config.seed, load_airframe().radius_m);
+    });
   }
   check_way(*this, world);
   const bool explores = config.stack.mission.kind == MissionConfig::Kind::kExplore;
@@ -180,12 +180,18 @@ void tell_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
 /// Fills in, before the scenario's own words are read again over it, what follows from them where
 /// they say nothing: exploration bounds that end where the world does, the mapped box around them,
 /// the scores of that region as the map sees it, and what the stack knows of its battery.
-void derive(ScenarioConfig asked, ScenarioConfig& config) {
+/// A file's world is explored as far as a vehicle gets.
+void derive(ScenarioConfig asked, const worlds::FileWorld* file_world, ScenarioConfig& config) {
   if (asked.stack.mission.kind == MissionConfig::Kind::kExplore) {
     ExplorationBounds& bounds = asked.stack.exploration.explorer.bounds;
-    const Eigen::AlignedBox2d world = worlds::extent_of(asked.world);
-    bounds.low_m = bounds.low_m.cwiseMax(world.min());
-    bounds.high_m = bounds.high_m.cwiseMin(world.max());
+    if (file_world != nullptr) {
+      const Eigen::AlignedBox2d reachable = worlds::extent_of(*file_world);
+      bounds.low_m = reachable.min();
+      bounds.high_m = reachable.max();
+    } else if (const auto world = worlds::extent_of(asked.world)) {
+      bounds.low_m = bounds.low_m.cwiseMax(world->min());
+      bounds.high_m = bounds.high_m.cwiseMin(world->max());
+    }
     config.stack.exploration.explorer.bounds = bounds;
   }
   tell_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
@@ -208,7 +214,9 @@ void derive(ScenarioConfig asked, ScenarioConfig& config) {
 std::string broken_world_rule(const ScenarioConfig& config) {
   if (config.stack.mission.kind != MissionConfig::Kind::kExplore) return "";
   const Vec2 rounding = Vec2::Constant(1e-6);
-  const Eigen::AlignedBox2d world = worlds::extent_of(config.world);
+  const auto known = worlds::extent_of(config.world);
+  if (!known) return "";  // nothing to see is beyond the edge of what was surveyed
+  const Eigen::AlignedBox2d world = *known;
   const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
   if (about.contains(config.stack.exploration.explorer.bounds.extent())) return "";
   std::array<char, 200> text{};
@@ -229,6 +237,21 @@ std::string broken_region_rule(const ScenarioConfig& config) {
   return mapped ? "" : "scoring.low_m, scoring.high_m within the heights of mapping.global";
 }
 
+/// Whether the exploration's bounds follow from a file that has to be read first.
+bool needs_file_to_bound(const ConfigNode& source, const ScenarioConfig& asked) {
+  if (asked.world.kind != worlds::WorldKind::kFile) return false;
+  if (asked.stack.mission.kind != MissionConfig::Kind::kExplore) return false;
+  const ConfigNode* exploration = source.find("exploration");
+  const ConfigNode* bounds = exploration ? exploration->find("bounds") : nullptr;
+  return bounds == nullptr || !bounds->find("low_m") || !bounds->find("high_m");
+}
+
+void resolve_world(Scenario& scenario) {
+  if (const ConfigNode* world = scenario.source.find("world")) {
+    resolve_paths(*world, scenario.config.world);
+  }
+}
+
 }  // namespace
 
 Scenario make_scenario(const std::string& name, ConfigNode source) {
@@ -239,9 +262,15 @@ Scenario make_scenario(const std::string& name, ConfigNode source) {
   load_plugins(scenario.source);
   ScenarioConfig asked;
   read_config(scenario.source, asked);
-  derive(std::move(asked), scenario.config);
+  if (needs_file_to_bound(scenario.source, asked)) {
+    scenario.config.world = asked.world;
+    resolve_world(scenario);
+    scenario.file_world = scenario.read_file_world();
+  }
+  derive(std::move(asked), scenario.file_world.get(), scenario.config);
   read_config(scenario.source, scenario.config);
   check_modules(scenario.config.stack, scenario.source);
+  resolve_world(scenario);
   if (const std::string rule = broken_region_rule(scenario.config); !rule.empty()) {
     config_detail::fail(config_detail::locate_rule(scenario.source, rule),
                         "out of range: expected " + rule);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,56 +12,16 @@
 #include "config/config.h"
 #include "physics/airframe.h"
 #include "physics/physics_config.h"
+#include "run/device_section.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
 #include "scoring/thin_branches.h"
-#include "sensors/d430.h"
 #include "sensors/imu.h"
-#include "sensors/mid360.h"
 #include "sensors/mocap_device.h"
 #include "stack/stack.h"
 #include "worlds/recipes.h"
 
 namespace arex::sim {
-
-/// The LiDAR that the odometry flies on.
-struct LidarConfig {
-  bool enabled = true;
-  double latency_s = 0.003;  ///< network and driver, after the frame's last firing (estimate)
-  Mid360Config model;        ///< its keys stand directly under `lidar`
-
-  void fields(auto& f) {
-    f("enabled", enabled, "fire it");
-    f("latency_s", latency_s, "end of a frame to its delivery");
-    model.fields(f);
-    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
-  }
-};
-
-/// The depth camera; it runs when the stack reads it (mapping.use_depth).
-struct DepthConfig {
-  double latency_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
-  D430Config model;          ///< its keys stand directly under `depth`
-
-  void fields(auto& f) {
-    f("latency_s", latency_s, "exposure of a frame to its delivery");
-    model.fields(f);
-    f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
-  }
-};
-
-/// A further device: its type, where it sits, and what differs from `lidar` or `depth`.
-struct DeviceSection {
-  std::string type;  ///< mid360 or d430
-  MountConfig mount;
-  ConfigNode own;  ///< of its type
-
-  void read(std::string_view name, const ConfigNode& section);
-  [[nodiscard]] std::vector<ParameterInfo> parameters() const;
-  /// Its parameters over those of the first of its type. @pre of that type
-  [[nodiscard]] LidarConfig over(LidarConfig first) const;
-  [[nodiscard]] DepthConfig over(DepthConfig first) const;
-};
 
 /// What the truth is compared with. Coverage is scored on explorations only.
 struct ScoringConfig {
@@ -132,6 +93,8 @@ struct Scenario {
   std::string name;  ///< the file's name without its ending
   ScenarioConfig config;
   ConfigNode source;  ///< what the file and the overrides say, for messages
+  /// The world of kind file, where something had to be known of it to read the scenario.
+  std::shared_ptr<const worlds::FileWorld> file_world;
 
   /// Every value; running it again gives the same trajectory hash.
   [[nodiscard]] std::string resolved_yaml() const;
@@ -139,12 +102,19 @@ struct Scenario {
   /// of a point which the mission flies to if that lies off the world or below its ground, and of
   /// `mission` if the vehicle has no room where it is to explore from.
   [[nodiscard]] worlds::World build_world() const;
+  /// The world of kind file as it was understood. @throws ConfigError at the line of `world`.
+  [[nodiscard]] std::shared_ptr<const worlds::FileWorld> read_file_world() const;
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;
 };
 
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
 Pose start_pose(const worlds::World& world);
+
+/// Names of files in a `world` section become absolute. They are relative to the file that says so,
+/// on the command line to the working directory.
+/// @param node what was said of the section
+void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world);
 
 /// The scenario that `source` asks for, checked, with what follows from it (such as the battery
 /// that the stack believes in). Whatever runs, sweeps, prints or checks a scenario has it from

@@ -67,7 +67,7 @@ void GlobalMap::add_frame(const RayCaster& rays) {
   // cache.
   std::array<Look, kBatch> looks;
   std::size_t count = 0;
-  const auto take_in = [&] {
+  const auto insert_batch = [&] {
     for (std::size_t i = 0; i < count; ++i) weigh(looks[i]);
     for (std::size_t i = 0; i < count; ++i) update(looks[i]);
     count = 0;
@@ -88,9 +88,9 @@ void GlobalMap::add_frame(const RayCaster& rays) {
          {&brick->known, &brick->occupied, &brick->at_low, &brick->at_high}) {
       __builtin_prefetch(mask);
     }
-    if (count == kBatch) take_in();
+    if (count == kBatch) insert_batch();
   }
-  take_in();
+  insert_batch();
   tree_.apply(changes_);
   for (const BrickChange& change : changes_) band_.note(change);
 }

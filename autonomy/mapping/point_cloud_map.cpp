@@ -59,7 +59,7 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
   };
   std::array<Keyed, kBatch> batch;
   std::size_t count = 0;
-  const auto take_in = [&] {
+  const auto insert_batch = [&] {
     const std::size_t mask = slots_.size() - 1;
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t at = slots_[hash_of(batch[i].key) & mask];
@@ -73,9 +73,9 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
     const std::uint64_t key = key_of(p, config_.voxel_m);
     __builtin_prefetch(&slots_[hash_of(key) & (slots_.size() - 1)]);
     batch[count++] = {key, p};
-    if (count == kBatch) take_in();
+    if (count == kBatch) insert_batch();
   }
-  take_in();
+  insert_batch();
 }
 
 void PointCloudMap::insert(std::uint64_t key, const Vec3f& p) {

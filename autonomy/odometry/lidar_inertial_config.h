@@ -100,8 +100,8 @@ struct OdometryHealthConfig {
   double degenerate_silence_s = 0.35;
   double lost_silence_s = 3.0;
   int lost_scans = 5;
-  double noticed_surprise = 1.2;
-  double doubtful_surprise = 4.0;
+  double noticed_innovation = 1.2;
+  double doubtful_innovation = 4.0;
   int recovery_points = 300;
   int recovery_yaw_steps = 36;
   double recovery_radius_m = 2.0;
@@ -122,10 +122,10 @@ struct OdometryHealthConfig {
     f("degenerate_silence_s", degenerate_silence_s, "without a correction: degenerate");
     f("lost_silence_s", lost_silence_s, "without a correction: lost");
     f("lost_scans", lost_scans, "refused scans in a row: lost");
-    f("noticed_surprise", noticed_surprise,
+    f("noticed_innovation", noticed_innovation,
       "a scan that corrects the prediction by this many sigma, RMS over the pose, is degenerate: "
       "the IMU errs (sound: below 0.4; 5 % of gyro scale in a spin: 2.1)");
-    f("doubtful_surprise", doubtful_surprise,
+    f("doubtful_innovation", doubtful_innovation,
       "a scan that corrects the prediction by this many sigma contradicts the IMU: degenerate, and "
       "kept out of the map; lost_scans of them in a row: lost");
     f("recovery_points", recovery_points, "of a scan scored at each guess of a recovery");

@@ -60,7 +60,8 @@ void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec
 
 }  // namespace
 
-std::vector<ScanPoint> thin(const std::vector<ScanPoint>& points, double voxel_m, int max_points) {
+std::vector<ScanPoint> voxel_downsample(const std::vector<ScanPoint>& points, double voxel_m,
+                                        int max_points) {
   // Open addressing over the cells met; a scan of 20,000 fills a third at most.
   constexpr std::size_t kSlots = 1U << 16;
   constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
@@ -141,7 +142,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
   if (report.accepted) {
     const Eigen::Matrix<double, 6, 1> d = local(filter.state(), x).head<6>();
     const Eigen::Matrix<double, 6, 6> P = P_pose.topLeftCorner<6, 6>();
-    report.surprise = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
+    report.innovation = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
     filter.finish(x, at_x.information);
   }
   return report;

@@ -104,7 +104,8 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   }
   // A filter that no scan can correct runs away within seconds.
   ErrorStateFilter tried = filter_;
-  points = thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+  points =
+      voxel_downsample(points, config_.registration.scan_voxel_m, config_.registration.max_points);
   if (!register_scan(points, map_, config_, tried).accepted) {
     map_ = SurfelMap(config_.map);
     return false;
@@ -136,8 +137,8 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     if (stood_at_) hold_standstill(scan.end);
     std::vector<ScanPoint> points =
         undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
-    const std::vector<ScanPoint> thinned =
-        thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+    const std::vector<ScanPoint> thinned = voxel_downsample(
+        points, config_.registration.scan_voxel_m, config_.registration.max_points);
     update.gyro_clipped = clipped.any();
     Vec3 missing = Vec3::Zero();
     if (status_ == OdometryStatus::kLost) {
@@ -200,7 +201,7 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   } else if (report.points >= hc.min_matches) {  // fewer are silence, which the IMU bridges
     ++refused_in_a_row_;
   }
-  const bool doubtful = report.accepted && report.surprise > hc.doubtful_surprise;
+  const bool doubtful = report.accepted && report.innovation > hc.doubtful_innovation;
   doubtful_in_a_row_ = doubtful ? doubtful_in_a_row_ + 1 : 0;
   const PoseInformation::Matrix P = filter_.pose_covariance();
   const double rotation_std = std::sqrt(P.diagonal().segment<3>(0).maxCoeff());
@@ -210,7 +211,7 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   if (refused_in_a_row_ >= hc.lost_scans || doubtful_in_a_row_ >= hc.lost_scans ||
       position_std > hc.lost_position_std_m || rotation_std > hc.lost_rotation_std_rad) {
     status_ = OdometryStatus::kLost;
-  } else if (!report.accepted || weak || report.surprise > hc.noticed_surprise ||
+  } else if (!report.accepted || weak || report.innovation > hc.noticed_innovation ||
              update.gyro_clipped || confirmations_left_ > 0) {
     status_ = OdometryStatus::kDegenerate;
   } else {

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "autonomy/exploration/test_map.h"
-#include "exploration/candidate_filter.h"
-#include "exploration/exploration_space.h"
 #include "config/config.h"
 #include "exploration/explorer.h"
+#include "exploration/explorer_config.h"
+#include "exploration/frontier_search.h"
 
 namespace arex {
 namespace {

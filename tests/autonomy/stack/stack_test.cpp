@@ -30,7 +30,7 @@ class HallFlight {
         autopilot.armed = stack_.view().state != MissionState::kInitialise;
         autopilot.landed = !autopilot.armed;
         stack_.add_autopilot(autopilot);
-        stack_.add_mocap({now_, X_OO * X_, Vec3::Zero()});
+        if (tracked_) stack_.add_mocap({now_, X_OO * X_, Vec3::Zero()});
       }
       if (now_ % kFrame == 0 && now_ > 0) {
         const test::AnalyticMotion still{{(Vec4() << X_.p, so3::yaw(X_.R)).finished()}, 1, 1000};
@@ -40,7 +40,7 @@ class HallFlight {
       }
       jobs_.advance(now_);
       const TrajectorySetpoint before = stack_.view().setpoint;
-      (void)stack_.tick();
+      if (const auto command = stack_.tick()) command_ = *command;
       largest_step_m_ =
           std::max(largest_step_m_, (stack_.view().setpoint.p_OB - before.p_OB).norm());
       X_ = X_OO.inverse() *
@@ -54,6 +54,8 @@ class HallFlight {
   Stamp now_ = 0;
   Pose X_;  ///< of the vehicle in the true O
   double largest_step_m_ = 0;
+  bool tracked_ = true;  ///< its pose comes
+  AttitudeCommand command_;
 };
 
 StackConfig goals(std::vector<Vec3> points) {
@@ -96,6 +98,77 @@ TEST(Stack, AfterAJumpTheMapIsForgottenAndTheFlightGoesOnFromWhereItIs) {
   EXPECT_TRUE(flight.stack_.view().grid);
   EXPECT_EQ(flight.stack_.view().stuck, "");
   EXPECT_EQ(flight.stack_.view().targets.size(), 2U);
+}
+
+// Without a pose it hovers level on what it weighs, and goes on with what it was about when the
+// pose is back in time; after that it comes down, and says that it was lost.
+TEST(Stack, WithoutOdometryItHoversLevelAndGoesOnOrComesDown) {
+  StackConfig config = goals({{8, 0, 1.5}});
+  config.mission.kind = MissionConfig::Kind::kWaypoints;
+  HallFlight flight(config);
+  flight.run(4);
+  ASSERT_EQ(flight.stack_.view().state, MissionState::kFly);
+  flight.tracked_ = false;
+  flight.run(0.5);
+  EXPECT_EQ(flight.stack_.view().state, MissionState::kLost);
+  EXPECT_EQ(flight.command_.mode, AutopilotMode::kAttitude);
+  EXPECT_NEAR(flight.command_.thrust_n, config.vehicle.mass_kg * kGravity, 1e-9);
+  flight.tracked_ = true;
+  flight.run(0.1);
+  EXPECT_EQ(flight.stack_.view().state, MissionState::kFly);
+  EXPECT_FALSE(flight.stack_.view().lost);
+  flight.run(10);
+  EXPECT_EQ(flight.stack_.view().targets.size(), 1U);
+  // Once more, for too long.
+  HallFlight again(config);
+  again.run(4);
+  again.tracked_ = false;
+  again.run(config.mission.lost_hover_s + 0.5);
+  EXPECT_EQ(again.command_.mode, AutopilotMode::kDescend);
+  EXPECT_TRUE(again.stack_.view().lost);
+  again.tracked_ = true;  // it does not change its mind
+  again.run(0.5);
+  EXPECT_EQ(again.command_.mode, AutopilotMode::kDescend);
+}
+
+TEST(Stack, AYawBurstTurnsOnTheSpotAsFastAsAsked) {
+  StackConfig config = goals({});
+  config.mission.kind = MissionConfig::Kind::kYawBurst;
+  config.mission.yaw_rates_radps = {0.5, 1.5};
+  config.mission.yaw_burst_s = 2;
+  HallFlight flight(config);
+  double fastest = 0, turned = 0, furthest = 0;
+  for (int k = 0; k < 200 && flight.stack_.view().state != MissionState::kLand; ++k) {
+    const double yaw = so3::yaw(flight.X_.R);
+    flight.run(0.1);
+    if (flight.stack_.view().state != MissionState::kFly) continue;
+    fastest = std::max(fastest, flight.stack_.view().setpoint.yaw_rate_radps);
+    turned += so3::wrap(so3::yaw(flight.X_.R) - yaw);
+    furthest = std::max(furthest, flight.X_.p.head<2>().norm());
+  }
+  EXPECT_EQ(flight.stack_.view().state, MissionState::kLand);
+  EXPECT_NEAR(fastest, 1.5, 1e-6);
+  EXPECT_GT(turned, 2 * 0.5 + 2 * 1.5 - 1);
+  EXPECT_LT(furthest, 0.01);
+}
+
+// Down the entry by straight legs, then it explores: from there the explorer is asked.
+TEST(Stack, EntersByLegsAndThenAsksTheExplorer) {
+  StackConfig config = goals({});
+  config.mission.kind = MissionConfig::Kind::kExplore;
+  config.mission.entry_m = {{2, 0, 1.5}, {4, 1, 1.5}};
+  HallFlight flight(config);
+  bool entered = false;
+  for (int k = 0; k < 300 && flight.stack_.view().state != MissionState::kExplore; ++k) {
+    flight.run(0.1);
+    entered |= flight.stack_.view().state == MissionState::kEntry;
+    EXPECT_TRUE(flight.stack_.take_decisions().empty());
+  }
+  EXPECT_TRUE(entered);
+  ASSERT_EQ(flight.stack_.view().state, MissionState::kExplore);
+  EXPECT_LT((flight.X_.p - Vec3(4, 1, 1.5)).norm(), 0.3);
+  flight.run(3);
+  EXPECT_FALSE(flight.stack_.take_decisions().empty());
 }
 
 TEST(Stack, AStepSmallerThanTheMapsMarginChangesNothing) {

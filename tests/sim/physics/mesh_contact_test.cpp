@@ -245,7 +245,7 @@ TEST(MeshContact, AThinWallOfManyTrianglesStopsTheNoseAsAMuJoCoBoxDoes) {
   fixtures::add_shape(box, SurfaceClass::kWall, worlds::CollisionShape::Kind::kBox,
                       {Mat3::Identity(), {1.25, 0, 0}}, {0.25, 1, 1});
   std::array<double, 2> x_min{}, at{};
-  for (const auto* world : {&mesh, &box}) {
+  for (const World* world : std::initializer_list<const World*>{&mesh, &box}) {
     Physics physics(fixtures::without_air(), *world, level(0.5, 0, 0), 1);
     physics.set_state(level(0.5, 0, 0), {3, 0, 0}, Vec3::Zero(), kStopped);
     const std::size_t which = world == &mesh ? 0 : 1;

@@ -131,7 +131,9 @@ TEST(Devices, ASecondLidarAndASecondCameraFillTheMapsAndTheBag) {
       EXPECT_EQ(summary["device_hashes"].contains(device), second) << device;
     }
     const auto now = summary["map"]["points"].get<std::size_t>();
-    if (second) EXPECT_GT(now, 1.5 * static_cast<double>(points));
+    if (second) {
+      EXPECT_GT(static_cast<double>(now), 1.5 * static_cast<double>(points));
+    }
     points = now;
     if (!second) continue;
     const TemporaryFolder again;

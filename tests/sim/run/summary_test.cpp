@@ -40,7 +40,7 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
   result.map.emplace();
   result.coverage.emplace();
   result.flight.thin.emplace();
-  result.plans = 1;
+  result.plans.plans = 1;
   result.timing = {summarise("replan", std::vector<float>())};
   std::set<std::string> counts{"map.points",
                                "map.scored",

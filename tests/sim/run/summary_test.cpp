@@ -50,7 +50,12 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
                                "thin.branches",
                                "thin.seen_in_time",
                                "planner.replans",
-                               "planner.failures"};
+                               "planner.failures",
+                               "planner.retimed",
+                               "planner.slowed"};
+  for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
+    counts.insert("planner.stages." + std::string(kPlanStageNames[stage]));
+  }
   counts.insert(expected.begin(), expected.end());
   EXPECT_EQ(with_value(summarise(scenario, result, {1, 1})), counts);
 }

@@ -86,28 +86,27 @@ class SdfReader {
     } else if (root.Model() != nullptr) {
       add(*root.Model(), pose_in_parent(*root.Model()), "", 0);
     } else {
-      throw std::runtime_error("holds neither a world nor a model");
+      throw std::runtime_error(complaints_.empty() ? "holds neither a world nor a model"
+                                                   : complaints_.front());
     }
     say_what_is_missing();
     return std::move(scene_);
   }
 
  private:
-  /// A model that cannot be found is left out, as Gazebo does; all else is an error.
+  /// As in Gazebo, what cannot be found or understood is left out, and said.
   void judge(const sdf::Errors& errors) {
     for (const sdf::Error& error : errors) {
       const std::string text = error.Message();
-      if (error.Code() == sdf::ErrorCode::URI_LOOKUP ||
-          error.Code() == sdf::ErrorCode::URI_INVALID) {
-        if (text.find("model://ground_plane") != std::string::npos) {
-          stand_in_for_the_ground();
-        } else if (text.find("model://sun") == std::string::npos) {
-          missing_.insert(text);
-        }
-        continue;
+      const bool lookup =
+          error.Code() == sdf::ErrorCode::URI_LOOKUP || error.Code() == sdf::ErrorCode::URI_INVALID;
+      if (!lookup) {
+        complaints_.push_back(text);
+      } else if (text.find("model://ground_plane") != std::string::npos) {
+        stand_in_for_the_ground();
+      } else if (text.find("model://sun") == std::string::npos) {
+        missing_.insert(text);
       }
-      if (error.Code() == sdf::ErrorCode::WARNING) continue;
-      throw std::runtime_error(text);
     }
   }
 
@@ -159,14 +158,12 @@ class SdfReader {
       for (std::uint64_t k = 0; k < link.VisualCount(); ++k) {
         const sdf::Visual& visual = *link.VisualByIndex(k);
         if (visual.Geom() == nullptr) continue;
-        add(*visual.Geom(), X_FL * resolved(visual, "visual"), name, material_of(visual),
-            model.FilePath().empty() ? file_ : fs::path(model.FilePath()));
+        add(*visual.Geom(), X_FL * resolved(visual, "visual"), name, material_of(visual));
       }
       for (std::uint64_t k = 0; link.VisualCount() == 0 && k < link.CollisionCount(); ++k) {
         const sdf::Collision& collision = *link.CollisionByIndex(k);
         if (collision.Geom() == nullptr) continue;
-        add(*collision.Geom(), X_FL * resolved(collision, "collision"), name, "",
-            model.FilePath().empty() ? file_ : fs::path(model.FilePath()));
+        add(*collision.Geom(), X_FL * resolved(collision, "collision"), name, "");
       }
     }
     for (std::uint64_t i = 0; i < model.ModelCount(); ++i) {
@@ -186,7 +183,7 @@ class SdfReader {
   }
 
   void add(const sdf::Geometry& geometry, const Pose& X_FP, const std::string& name,
-           const std::string& material, const fs::path& beside) {
+           const std::string& material) {
     using Kind = FilePrimitive::Kind;
     const auto primitive = [&](const char* shape, Kind kind, const Vec3& size) {
       scene_.primitives.push_back({kind, X_FP, size, add_group(name, material, shape)});
@@ -214,9 +211,9 @@ class SdfReader {
                          add_group(name, material, "plane"));
       }
       case sdf::GeometryType::MESH:
-        return add_mesh(*geometry.MeshShape(), X_FP, name, material, beside);
+        return add_mesh(*geometry.MeshShape(), X_FP, name, material);
       case sdf::GeometryType::HEIGHTMAP:
-        return add_terrain(*geometry.HeightmapShape(), X_FP, name, beside);
+        return add_terrain(*geometry.HeightmapShape(), X_FP, name);
       case sdf::GeometryType::EMPTY:
         break;
     }
@@ -267,9 +264,14 @@ class SdfReader {
     }
   }
 
+  /// The file that names another one: an included model's, or the world's.
+  [[nodiscard]] fs::path named_in(const auto& shape) const {
+    return shape.FilePath().empty() ? file_ : fs::path(shape.FilePath());
+  }
+
   void add_mesh(const sdf::Mesh& mesh, const Pose& X_FP, const std::string& name,
-                const std::string& material, const fs::path& beside) {
-    const fs::path file = resolver_.find(mesh.Uri(), beside);
+                const std::string& material) {
+    const fs::path file = resolver_.find(mesh.Uri(), named_in(mesh));
     if (file.empty()) {
       missing_.insert(mesh.Uri());
       return;
@@ -314,9 +316,8 @@ class SdfReader {
     return place->second;
   }
 
-  void add_terrain(const sdf::Heightmap& map, const Pose& X_FP, const std::string& name,
-                   const fs::path& beside) {
-    const fs::path file = resolver_.find(map.Uri(), beside);
+  void add_terrain(const sdf::Heightmap& map, const Pose& X_FP, const std::string& name) {
+    const fs::path file = resolver_.find(map.Uri(), named_in(map));
     if (file.empty()) {
       missing_.insert(map.Uri());
       return;
@@ -330,6 +331,11 @@ class SdfReader {
       scene_.notes.push_back(std::to_string(missing_.size()) + " files not found and left out (" +
                              shortened(*missing_.begin(), 100) + "); see world.file.model_paths");
     }
+    if (!complaints_.empty()) {
+      scene_.notes.push_back(
+          std::to_string(complaints_.size()) +
+          " things that are not understood, first: " + shortened(complaints_.front(), 200));
+    }
     if (unknown_shapes_ > 0) {
       scene_.notes.push_back(std::to_string(unknown_shapes_) +
                              " shapes of a kind that is not read left out");
@@ -342,6 +348,7 @@ class SdfReader {
   std::map<std::string, Pose> moved_to_;
   std::map<std::string, FileScene> meshes_;
   std::set<std::string> missing_;
+  std::vector<std::string> complaints_;
   std::size_t unknown_shapes_ = 0;
 };
 

@@ -90,6 +90,16 @@ double lowest_of(const CollisionShape& shape) {
   return shape.X_WS.p.z() - reach;
 }
 
+/// The normal and two tangents, row by row, as MuJoCo chooses them.
+void put_frame(const Vec3& normal, mjtNum* frame) {
+  const Vec3 seed = std::abs(normal.y()) < 0.5 ? Vec3::UnitY() : Vec3::UnitZ();
+  const Vec3 first = (seed - seed.dot(normal) * normal).normalized();
+  const Vec3 second = normal.cross(first);
+  std::copy_n(normal.data(), 3, frame);
+  std::copy_n(first.data(), 3, frame + 3);
+  std::copy_n(second.data(), 3, frame + 6);
+}
+
 int require_name(const mjModel& model, mjtObj kind, const std::string& name) {
   const int id = mj_name2id(&model, kind, name.c_str());
   if (id < 0) throw std::runtime_error("arex.xml has no " + name);
@@ -299,8 +309,7 @@ void ContactScene::add_mesh_contacts(mjData& data, const Pose& X_WB) {
     mjContact contact{};
     contact.dist = -touch.depth_m;
     std::copy_n(touch.p_W.data(), 3, contact.pos);
-    std::copy_n(touch.normal_W.data(), 3, contact.frame);
-    mju_makeFrame(contact.frame);
+    put_frame(touch.normal_W, contact.frame);
     contact.geom1 = mesh_geom_;
     contact.geom2 = first_vehicle_geom_ + static_cast<int>(touch.shape);
     // All geoms of the model are of one material.

@@ -365,7 +365,9 @@ void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP, 
   if (png_image_begin_read_from_file(&image, file.c_str()) == 0) {
     throw std::runtime_error("names the height map " + file.string() + ", which is no PNG");
   }
-  image.format = PNG_FORMAT_LINEAR_Y;  // 16 bit
+  // Heights are the samples as they stand: nothing is to correct them for a screen.
+  const bool deep = (image.format & PNG_FORMAT_FLAG_LINEAR) != 0;
+  image.format = deep ? PNG_FORMAT_LINEAR_Y : PNG_FORMAT_GRAY;
   const std::uint32_t columns = image.width, rows = image.height;
   constexpr std::uint32_t kMost = 5000;
   if (columns < 2 || rows < 2 || columns > kMost || rows > kMost) {
@@ -373,9 +375,12 @@ void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP, 
     throw std::runtime_error("names a height map of absurd size");
   }
   std::vector<std::uint16_t> level(std::size_t{columns} * rows);
-  if (png_image_finish_read(&image, nullptr, level.data(), 0, nullptr) == 0) {
+  std::vector<std::uint8_t> shallow(deep ? 0 : level.size());
+  void* samples = deep ? static_cast<void*>(level.data()) : shallow.data();
+  if (png_image_finish_read(&image, nullptr, samples, 0, nullptr) == 0) {
     throw std::runtime_error("names the height map " + file.string() + ", which is damaged");
   }
+  std::copy(shallow.begin(), shallow.end(), level.begin());
   // Gazebo: the brightest sample of the image stands for the whole height; row 0 is the far side.
   const double most = std::max<double>(1, *std::max_element(level.begin(), level.end()));
   const auto first = static_cast<std::uint32_t>(scene.vertices.size());

@@ -55,7 +55,8 @@ TEST_F(FileWorldScenario, PathsAreRelativeToWhoeverNamesThem) {
 }
 
 TEST_F(FileWorldScenario, ExploresWhatCanBeReachedUnlessToldOtherwise) {
-  const auto file = write(kWorld + "mission: {kind: explore}\n");
+  const std::string below_the_top = "    high_m: [4, 3, 2.9]\n";
+  const auto file = write(kWorld + below_the_top + "mission: {kind: explore}\n");
   const Scenario scenario = load_scenario(file, {}, {});
   ASSERT_NE(scenario.file_world, nullptr);
   const ExplorationBounds& bounds = scenario.config.stack.exploration.explorer.bounds;
@@ -91,7 +92,8 @@ TEST_F(FileWorldScenario, WhatIsWrongIsSaidWhereItWasGiven) {
 
 TEST(FileWorldScenarios, ThoseShippedAreValid) {
   std::size_t count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios/files")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios/files")) {
     // Where the worlds lie beside the clone, or where everything that follows from them is said.
     try {
       const Scenario scenario = load_scenario(entry.path(), {}, 1);

@@ -86,27 +86,27 @@ class SdfReader {
     } else if (root.Model() != nullptr) {
       add(*root.Model(), pose_in_parent(*root.Model()), "", 0);
     } else {
-      throw std::runtime_error("holds neither a world nor a model");
+      throw std::runtime_error(complaints_.empty() ? "holds neither a world nor a model"
+                                                   : complaints_.front());
     }
     say_what_is_missing();
     return std::move(scene_);
   }
 
  private:
-  /// A model that cannot be found is left out, as Gazebo does; all else is an error.
+  /// As in Gazebo, what cannot be found or understood is left out, and said.
   void judge(const sdf::Errors& errors) {
     for (const sdf::Error& error : errors) {
       const std::string text = error.Message();
-      if (error.Code() == sdf::ErrorCode::URI_LOOKUP ||
-          error.Code() == sdf::ErrorCode::URI_INVALID) {
-        if (text.find("model://ground_plane") != std::string::npos) {
-          stand_in_for_the_ground();
-        } else if (text.find("model://sun") == std::string::npos) {
-          missing_.insert(text);
-        }
-        continue;
+      const bool lookup =
+          error.Code() == sdf::ErrorCode::URI_LOOKUP || error.Code() == sdf::ErrorCode::URI_INVALID;
+      if (!lookup) {
+        complaints_.push_back(text);
+      } else if (text.find("model://ground_plane") != std::string::npos) {
+        stand_in_for_the_ground();
+      } else if (text.find("model://sun") == std::string::npos) {
+        missing_.insert(text);
       }
-      throw std::runtime_error(text);
     }
   }
 
@@ -331,6 +331,11 @@ class SdfReader {
       scene_.notes.push_back(std::to_string(missing_.size()) + " files not found and left out (" +
                              shortened(*missing_.begin(), 100) + "); see world.file.model_paths");
     }
+    if (!complaints_.empty()) {
+      scene_.notes.push_back(
+          std::to_string(complaints_.size()) +
+          " things that are not understood, first: " + shortened(complaints_.front(), 200));
+    }
     if (unknown_shapes_ > 0) {
       scene_.notes.push_back(std::to_string(unknown_shapes_) +
                              " shapes of a kind that is not read left out");
@@ -343,6 +348,7 @@ class SdfReader {
   std::map<std::string, Pose> moved_to_;
   std::map<std::string, FileScene> meshes_;
   std::set<std::string> missing_;
+  std::vector<std::string> complaints_;
   std::size_t unknown_shapes_ = 0;
 };
 
@@ -359,7 +365,9 @@ void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP, 
   if (png_image_begin_read_from_file(&image, file.c_str()) == 0) {
     throw std::runtime_error("names the height map " + file.string() + ", which is no PNG");
   }
-  image.format = PNG_FORMAT_LINEAR_Y;  // 16 bit
+  // Heights are the samples as they stand: nothing is to correct them for a screen.
+  const bool deep = (image.format & PNG_FORMAT_FLAG_LINEAR) != 0;
+  image.format = deep ? PNG_FORMAT_LINEAR_Y : PNG_FORMAT_GRAY;
   const std::uint32_t columns = image.width, rows = image.height;
   constexpr std::uint32_t kMost = 5000;
   if (columns < 2 || rows < 2 || columns > kMost || rows > kMost) {
@@ -367,9 +375,12 @@ void append_heightmap(const fs::path& file, const Vec3& size, const Pose& X_FP, 
     throw std::runtime_error("names a height map of absurd size");
   }
   std::vector<std::uint16_t> level(std::size_t{columns} * rows);
-  if (png_image_finish_read(&image, nullptr, level.data(), 0, nullptr) == 0) {
+  std::vector<std::uint8_t> shallow(deep ? 0 : level.size());
+  void* samples = deep ? static_cast<void*>(level.data()) : shallow.data();
+  if (png_image_finish_read(&image, nullptr, samples, 0, nullptr) == 0) {
     throw std::runtime_error("names the height map " + file.string() + ", which is damaged");
   }
+  std::copy(shallow.begin(), shallow.end(), level.begin());
   // Gazebo: the brightest sample of the image stands for the whole height; row 0 is the far side.
   const double most = std::max<double>(1, *std::max_element(level.begin(), level.end()));
   const auto first = static_cast<std::uint32_t>(scene.vertices.size());

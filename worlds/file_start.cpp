@@ -18,6 +18,7 @@ constexpr double kResolution = 0.2;  // m; conservative cells make every gap nar
 constexpr double kMostCells = 4e7;   // beyond, the cells grow
 constexpr double kHover = 0.8;       // where room is looked for, above the ground, m
 constexpr double kWanted = 0.7;      // room there that is as good as more, m
+constexpr double kOneFloor = 0.01;   // between levels that are the same, m
 constexpr double kLattice = 0.4;     // between the places that are tried, m
 constexpr double kFoot = 0.1;        // from the middle to a leg, along x and y, m
 constexpr double kUneven = 0.05;     // between the ground's heights under middle and legs, m
@@ -188,7 +189,14 @@ std::vector<Candidate> candidates(const World& world, const Ground& ground, cons
   for (double j = first.y(); j <= last.y(); ++j) {
     for (double i = first.x(); i <= last.x(); ++i) {
       const Vec2 p = wanted + kLattice * Vec2(i, j);
-      for (const double z : ground.heights(p)) {
+      const std::vector<double> heights = ground.heights(p);
+      for (std::size_t k = 0; k < heights.size(); ++k) {
+        const double z = heights[k];
+        // Two layers of one floor, or a slab over a crawl space.
+        if (k + 1 < heights.size() && heights[k + 1] > z + kOneFloor &&
+            heights[k + 1] < z + kHover) {
+          continue;
+        }
         const Vec3 place(p.x(), p.y(), z);
         const Eigen::Vector3i hover = space.free.grid.cell_of(place + kHover * Vec3::UnitZ());
         if (!space.free.grid.contains(hover)) continue;

@@ -81,7 +81,9 @@ FileScene read_contained(const FileRecipe& recipe, const std::string& ending) {
         ".bt .ot .pcd");
   }
   ContainedLimits limits;
-  limits.cpu_s = 3 + size_of(recipe.path) / 1e6;
+  // libsdformat takes 10 us for a byte.
+  const bool sdf = ending == "sdf" || ending == "world";
+  limits.cpu_s = 3 + size_of(recipe.path) * (sdf ? 6e-5 : 1e-6);
   return FileScene::unpack(
       run_contained([&] { return read_scene(recipe, ending).pack(); }, limits));
 }
@@ -120,9 +122,8 @@ FileUp believed_up(FileUp up, bool primitives, const FileScene& scene, std::stri
   if (primitives || (up != FileUp::kY && up != FileUp::kZ)) return up;
   const Eigen::Index said = up == FileUp::kY ? 1 : 2, other = up == FileUp::kY ? 2 : 1;
   const Levelness as_said = levelness(scene, said), as_other = levelness(scene, other);
-  constexpr double kClearly = 3;
-  const bool doubtful =
-      as_other.area > kClearly * as_said.area && as_said.height > kClearly * as_other.height;
+  constexpr double kOnEdge = 10;  // as high as that many times what it would be otherwise
+  const bool doubtful = as_other.area > as_said.area && as_said.height > kOnEdge * as_other.height;
   if (!doubtful) return up;
   note = text_of(
       "%c is taken as up, for along %c it would be %.0f m high and hardly level anywhere; "
@@ -315,7 +316,8 @@ World build(const FileRecipe& recipe, FileScene& scene, std::vector<bool>& named
   named = objects.named();
   World world = builder.finish();
   if (!recipe.low_m.empty()) world.bounds.low = Vec3(recipe.low_m.data());
-  world.bounds.high.z() += kHeadroom;
+  // Nobody knows what is above the highest cell.
+  if (scene.voxel_m == 0) world.bounds.high.z() += kHeadroom;
   if (!recipe.high_m.empty()) world.bounds.high = Vec3(recipe.high_m.data());
   if (!((world.bounds.high - world.bounds.low).minCoeff() > 0)) {
     throw ConfigError("has bounds without room: see file.low_m, file.high_m");

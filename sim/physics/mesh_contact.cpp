@@ -71,12 +71,14 @@ MeshContacts::Skeleton MeshContacts::skeleton_of(const CollisionShape& shape) {
   Skeleton out;
   out.centre_B = shape.X_WS.p;
   out.axis_B = shape.X_WS.R.col(2);
+  out.root_B = shape.X_WS.p;
   const double radius = shape.size.x(), half = shape.size.y();
   switch (shape.kind) {
     case CollisionShape::Kind::kCapsule:
       out.radius_m = radius;
       out.points_B = {shape.X_WS * Vec3(0, 0, -half), shape.X_WS * Vec3(0, 0, half)};
       out.edges = {{0, 1}};
+      out.root_B = out.points_B[out.points_B[0].norm() < out.points_B[1].norm() ? 0 : 1];
       break;
     case CollisionShape::Kind::kBox: {
       out.radius_m = std::min(kRounding, 0.5 * shape.size.minCoeff());
@@ -170,11 +172,11 @@ void MeshContacts::touch(std::uint32_t shape, const Pose& X_WB) {
   gather(box);
   if (faces_.empty()) return;
   first_of_shape_ = touches_.size();
-  behind_.assign(points_W_.size(), 0);
+  root_W_ = X_WB * skeleton.root_B;
+  wall_of_root_ = first_between(middle_, root_W_);
+  behind_.resize(points_W_.size());
   for (std::size_t i = 0; i < points_W_.size(); ++i) {
-    bool behind = false;
-    touch_point(shape, points_W_[i], behind);
-    behind_[i] = behind;
+    behind_[i] = touch_point(shape, points_W_[i]);
   }
   if (skeleton.is_disc) touch_rim(shape, X_WB);
   for (const auto& [a, b] : skeleton.edges) {
@@ -184,25 +186,32 @@ void MeshContacts::touch(std::uint32_t shape, const Pose& X_WB) {
   if (touches_.size() == first_of_shape_) touch_corners(shape, X_WB);
 }
 
-void MeshContacts::touch_point(std::uint32_t shape, const Vec3& p, bool& behind) {
-  const double radius = skeletons_[shape].radius_m;
+const MeshContacts::Face* MeshContacts::first_between(const Vec3& a, const Vec3& b) const {
   double first = kNone;
-  const Face* wall = nullptr;
+  const Face* found = nullptr;
   for (const Face& face : faces_) {
-    const double share = crossing(middle_, p, face.corners, face.normal);
-    if (share < first) {
-      first = share;
-      wall = &face;
-    }
+    const double share = crossing(a, b, face.corners, face.normal);
+    if (share >= first) continue;
+    first = share;
+    found = &face;
   }
+  return found;
+}
+
+bool MeshContacts::touch_point(std::uint32_t shape, const Vec3& p) {
+  const double radius = skeletons_[shape].radius_m;
+  // Behind a wall already, a root holds nothing back itself.
+  const bool root_is_behind = wall_of_root_ != nullptr;
+  const Face* wall = root_is_behind ? wall_of_root_ : first_between(root_W_, p);
   if (wall != nullptr) {
-    behind = true;
-    const double side = wall->normal.dot(middle_ - wall->corners[0]);
+    const Vec3& before = root_is_behind ? middle_ : root_W_;
+    const double side = wall->normal.dot(before - wall->corners[0]);
     const Vec3 normal = side > 0 ? wall->normal : Vec3(-wall->normal);
     const double below = -normal.dot(p - wall->corners[0]);
-    const double depth = radius + std::max(0.0, below);
-    add({shape, wall->triangle, p + 0.5 * (below - radius) * normal, normal, depth});
-    return;
+    if (below > -radius) {
+      add({shape, wall->triangle, p + 0.5 * (below - radius) * normal, normal, radius + below});
+    }
+    return true;
   }
   for (const Face& face : faces_) {
     if (((face.box.min() - p).array() > radius).any() ||
@@ -217,23 +226,22 @@ void MeshContacts::touch_point(std::uint32_t shape, const Vec3& p, bool& behind)
     const Vec3 normal = (p - q) / distance;
     add({shape, face.triangle, q + 0.5 * (distance - radius) * normal, normal, radius - distance});
   }
+  return false;
 }
 
 // The rim's point that lies deepest behind a triangle is seldom one of the polygon's.
 void MeshContacts::touch_rim(std::uint32_t shape, const Pose& X_WB) {
   const Skeleton& skeleton = skeletons_[shape];
   const Vec3 axis = X_WB.R * skeleton.axis_B;
-  for (std::size_t i = 0; i < faces_.size(); ++i) {
-    const Face face = faces_[i];  // by value: nothing below may change it
-    const double side = face.normal.dot(middle_ - face.corners[0]);
+  const Vec3& before = wall_of_root_ != nullptr ? middle_ : root_W_;
+  for (const Face& face : faces_) {
+    const double side = face.normal.dot(before - face.corners[0]);
     const Vec3 into = side > 0 ? Vec3(-face.normal) : face.normal;
     const Vec3 radial = into - into.dot(axis) * axis;
     if (radial.norm() < 1e-3) continue;  // lies flat on it: the polygon will do
     const Vec3 p = X_WB * skeleton.centre_B + skeleton.rim_m * radial.normalized() +
                    std::copysign(skeleton.half_m, into.dot(axis)) * axis;
-    if (into.dot(p - face.corners[0]) < -skeleton.radius_m) continue;
-    bool behind = false;
-    touch_point(shape, p, behind);
+    if (into.dot(p - face.corners[0]) > -skeleton.radius_m) touch_point(shape, p);
   }
 }
 
@@ -253,13 +261,8 @@ void MeshContacts::touch_edge(std::uint32_t shape, const Vec3& a, const Vec3& b)
       const double distance = (p - q).norm();
       if (!(distance < radius) || distance == 0) continue;
       if (!is_nearest(p, q, distance)) continue;
-      Vec3 normal = (p - q) / distance;
-      double depth = radius - distance;
-      // Once it has passed over the edge, the vehicle's middle tells where it came from.
-      if (t > 0 && t < 1 && normal.dot(middle_ - q) < 0 && std::abs(normal.dot(d - c)) < 1e-6) {
-        normal = -normal;
-        depth = radius + distance;
-      }
+      const double depth = radius - distance;
+      const Vec3 normal = (p - q) / distance;
       add({shape, face.triangle, q - 0.5 * depth * normal, normal, depth});
     }
   }

@@ -27,9 +27,10 @@ struct MeshTouch {
 /// nearest in its surroundings, so that edges between triangles of one surface are not felt.
 ///
 /// On which side of a surface the vehicle is cannot be seen from the surface. So the middle of the
-/// vehicle is followed: a point on it that never passes through a triangle. What a line from there
-/// meets before it gets to a point of the skeleton holds that point back, however deep it is. Walls
-/// without thickness cannot be passed at any speed.
+/// vehicle is followed: a point on it that never passes through a triangle. From there a line leads
+/// within the airframe to each solid's root, and on to the points of its skeleton. What it meets on
+/// its way holds the point back, however deep it is: walls without thickness cannot be passed at
+/// any speed.
 class MeshContacts {
  public:
   /// @param world, airframe: must outlive this object; X_WS of a shape is its pose in B
@@ -57,6 +58,7 @@ class MeshContacts {
   struct Skeleton {
     std::vector<Vec3> points_B;
     std::vector<std::array<std::uint32_t, 2>> edges;  ///< of points
+    Vec3 root_B = Vec3::Zero();  ///< where the solid meets the rest of the airframe
     double radius_m = 0;
     bool is_disc = false;
     Vec3 centre_B = Vec3::Zero(), axis_B = Vec3::UnitZ();
@@ -74,7 +76,10 @@ class MeshContacts {
   void follow_middle(const Vec3& p_WB);
   void gather(const Eigen::AlignedBox3d& box);
   void touch(std::uint32_t shape, const Pose& X_WB);
-  void touch_point(std::uint32_t shape, const Vec3& p, bool& behind);
+  /// The first triangle on the way from a to b; nullptr: none.
+  [[nodiscard]] const Face* first_between(const Vec3& a, const Vec3& b) const;
+  /// @return whether the point is behind a triangle
+  bool touch_point(std::uint32_t shape, const Vec3& p);
   void touch_rim(std::uint32_t shape, const Pose& X_WB);
   void touch_edge(std::uint32_t shape, const Vec3& a, const Vec3& b);
   void touch_corners(std::uint32_t shape, const Pose& X_WB);
@@ -96,6 +101,8 @@ class MeshContacts {
   std::vector<Vec3> points_W_;
   std::vector<std::uint8_t> behind_;
   std::size_t first_of_shape_ = 0;
+  Vec3 root_W_ = Vec3::Zero();
+  const Face* wall_of_root_ = nullptr;  ///< between the middle and the root
 };
 
 }  // namespace arex::sim

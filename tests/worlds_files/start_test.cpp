@@ -30,7 +30,9 @@ double distance_to(const World& world, const Vec3& p) {
 
 TEST(FileStart, IsFoundOnTheGroundWithRoomAround) {
   const TemporaryFolder folder;
-  const FileWorld loaded = load_file_world(room_recipe(folder), test::kVehicleRadius);
+  FileRecipe recipe = room_recipe(folder);
+  recipe.high_m = {4, 3, 2.9};  // not over the walls
+  const FileWorld loaded = load_file_world(recipe, test::kVehicleRadius);
   const Vec3 p = loaded.world.X_WS.p;
   EXPECT_TRUE(loaded.start_found);
   EXPECT_NEAR(p.z(), 0, 1e-6);
@@ -67,7 +69,7 @@ TEST(FileStart, WhatIsWrongWithAGivenOneIsSaid) {
 }
 
 TEST(FileStart, TheLowestFloorWithRoomIsTaken) {
-  // Three slabs: 1.0 m of room below the first, then 2.5 m, then the sky.
+  // Three slabs: 0.25 m of room above the first, 2.45 m above the second, then the sky.
   MeshBuilder builder;
   const auto slab = builder.add_object(SurfaceClass::kWall, 0.3);
   for (const double z : {-0.1, 0.35, 3.0}) {

@@ -289,14 +289,15 @@ TEST(MeshContact, ASpikeIsFeltUnderABoxAndADisc) {
   MeshBuilder builder;
   const auto spike = builder.add_object(SurfaceClass::kLog, 0.3, true);
   for (const Vec2& p : {Vec2(-0.01, 0), Vec2(0.095, 0.22)}) {  // below the body, below a propeller
-    const Vec3 top(p.x(), p.y(), 0);
+    const Vec3 top(p.x(), p.y(), p.y() > 0 ? 0.045 : 0);
     const std::array<Vec3, 3> feet{top + Vec3(0.02, 0, -1), top + Vec3(-0.02, 0.02, -1),
                                    top + Vec3(-0.02, -0.02, -1)};
     for (std::size_t i = 0; i < 3; ++i)
       builder.add_triangle(spike, top, feet[i], feet[(i + 1) % 3]);
   }
   const World world = builder.finish();
-  Physics physics(fixtures::without_air(), world, level(0, 0, 0.3), 1);
+  // Level, so that both are met before it tips: the legs find nothing to stand on.
+  Physics physics(fixtures::without_air(), world, level(0, 0, 0.15), 1);
   std::array<bool, 2> felt{};
   for (int i = 0; i < 400; ++i) {
     physics.step({});
@@ -306,6 +307,7 @@ TEST(MeshContact, ASpikeIsFeltUnderABoxAndADisc) {
     }
   }
   EXPECT_TRUE(felt[0]);
+  EXPECT_TRUE(felt[1]);
 }
 
 TEST(MeshContact, LyingOnItsBackInABowlItComesToRest) {

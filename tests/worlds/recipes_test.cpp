@@ -47,7 +47,7 @@ TEST(BuildWorld, LiesWithinTheExtentThatIsKnownBefore) {
     config.gaps.width_m = 12;
     config.empty.size_m = {20, 24};
     config.garage.length_m = 80;
-    const Eigen::AlignedBox2d extent = extent_of(config);
+    const Eigen::AlignedBox2d extent = extent_of(config).value();
     const World world = build_world(config, 2, kRadius);
     EXPECT_TRUE(world.X_WS.p.head<2>().isZero()) << static_cast<int>(kind);
     // Walls and the ground's last cell stand just outside; the garage's entrance before x = 0.

@@ -118,7 +118,7 @@ TEST(FileMeshes, OurOwnExportComesBackWithItsClasses) {
   write_ply(world, folder / "mesh.ply");
   const World again = test::load(folder / "mesh.ply");
   std::array<double, kSurfaceClassNames.size()> area{};
-  for (const auto* each : {&world, &again}) {
+  for (const World* each : std::initializer_list<const World*>{&world, &again}) {
     const double sign = each == &world ? 1 : -1;
     for (std::size_t t = 0; t < each->mesh.triangles.size(); ++t) {
       const auto& [a, b, c] = each->mesh.triangles[t];

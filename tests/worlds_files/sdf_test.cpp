@@ -113,8 +113,8 @@ TEST(Sdf, IncludesAndMeshesAreFoundAlongThePath) {
                    "<model><name>tower</name><sdf version='1.6'>model.sdf</sdf></model>");
   test::write_file(folder / "elsewhere/tower/model.sdf", tower);
   // Centimetres, y up: as the mesh says.
-  const auto cm =
-      test::mapped(test::room(), [](const Vec3& p) { return 100 * Vec3(p.x(), p.z(), -p.y()); });
+  const auto cm = test::mapped(
+      test::room(), [](const Vec3& p) -> Vec3 { return 100 * Vec3(p.x(), p.z(), -p.y()); });
   test::write_file(folder / "elsewhere/tower/meshes/room.dae",
                    test::collada(cm, "Y_UP", 0.01, Eigen::Matrix4d::Identity()));
   test::write_file(

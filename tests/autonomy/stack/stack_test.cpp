@@ -125,7 +125,7 @@ TEST(Stack, WithoutOdometryItHoversLevelAndGoesOnOrComesDown) {
   again.tracked_ = false;
   again.run(config.mission.lost_hover_s + 0.5);
   EXPECT_EQ(again.command_.mode, AutopilotMode::kDescend);
-  EXPECT_TRUE(again.stack_.view().lost);
+  EXPECT_EQ(again.stack_.view().state, MissionState::kLost);
   again.tracked_ = true;  // it does not change its mind
   again.run(0.5);
   EXPECT_EQ(again.command_.mode, AutopilotMode::kDescend);

@@ -51,7 +51,7 @@ TEST(RunReport, ShowsEveryFigureWithItsUnitAndWhatItMeans) {
   EXPECT_TRUE(contains(html, "<dt>odometry error, RMS</dt><dd>20 mm</dd>"));
   EXPECT_TRUE(contains(html, "<dt>distance flown</dt><dd>31.4 m</dd>"));
   EXPECT_FALSE(contains(html, "<dt>time to 95 % of the area</dt>"));  // it never got so far
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : figures_in(*run.summary)) {
     EXPECT_TRUE(contains(html, "<code>" + figure.column() + "</code>")) << figure.key;
   }
   EXPECT_TRUE(contains(html, "<td class=\"word\">landing error</td><td>–</td>"));

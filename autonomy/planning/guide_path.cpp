@@ -112,8 +112,8 @@ class CostMap {
         occupied[index({x, y})] = map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied;
       }
     }
-    const auto squared = squared_distances(size_.x(), size_.y(),
-                                           [&](std::size_t cell) { return occupied[cell]; });
+    const auto squared =
+        squared_distances(size_.x(), size_.y(), [&](std::size_t cell) { return occupied[cell]; });
     distance_.resize(squared.size());
     std::transform(squared.begin(), squared.end(), distance_.begin(), [](std::int32_t d2) {
       return d2 == kNoObstacle ? kInfinity : std::sqrt(static_cast<double>(d2));

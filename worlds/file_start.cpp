@@ -54,6 +54,19 @@ class Ground {
     }
   }
 
+  /// Those of the heights that nothing level is just above: of two layers of one floor the upper,
+  /// of a slab its top.
+  [[nodiscard]] std::vector<double> floors(const Vec2& p) const {
+    const std::vector<double> all = heights(p);
+    std::vector<double> open;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto above = std::find_if(all.begin() + static_cast<std::ptrdiff_t>(i), all.end(),
+                                      [&](double z) { return z > all[i] + kOneFloor; });
+      if (above == all.end() || *above >= all[i] + kHover) open.push_back(all[i]);
+    }
+    return open;
+  }
+
   /// Ascending, in m.
   [[nodiscard]] std::vector<double> heights(const Vec2& p) const {
     std::vector<double> found;
@@ -189,14 +202,7 @@ std::vector<Candidate> candidates(const World& world, const Ground& ground, cons
   for (double j = first.y(); j <= last.y(); ++j) {
     for (double i = first.x(); i <= last.x(); ++i) {
       const Vec2 p = wanted + kLattice * Vec2(i, j);
-      const std::vector<double> heights = ground.heights(p);
-      for (std::size_t k = 0; k < heights.size(); ++k) {
-        const double z = heights[k];
-        // Two layers of one floor, or a slab over a crawl space.
-        if (k + 1 < heights.size() && heights[k + 1] > z + kOneFloor &&
-            heights[k + 1] < z + kHover) {
-          continue;
-        }
+      for (const double z : ground.floors(p)) {
         const Vec3 place(p.x(), p.y(), z);
         const Eigen::Vector3i hover = space.free.grid.cell_of(place + kHover * Vec3::UnitZ());
         if (!space.free.grid.contains(hover)) continue;
@@ -246,7 +252,7 @@ FoundStart search(const World& world, const Ground& ground, Space& space, double
 FoundStart given(const World& world, const Ground& ground, const FileStart& start,
                  double radius_m) {
   const Vec2 p(start.position_m[0], start.position_m[1]);
-  const std::vector<double> heights = ground.heights(p);
+  const std::vector<double> heights = ground.floors(p);
   std::string name =
       "[" + config_detail::format_scalar(p.x()) + ", " + config_detail::format_scalar(p.y());
   const bool has_height = start.position_m.size() == 3;

@@ -361,17 +361,22 @@ class FormClasses {
     const double slope = std::abs((v[1] - v[0]).cross(v[2] - v[0]).normalized().z());
     if (slope < kLevel) return SurfaceClass::kWall;
     const Vec3 middle = (v[0] + v[1] + v[2]) / 3;
-    if (is_open(middle, 1)) return slope > kFlat ? SurfaceClass::kFloor : SurfaceClass::kRamp;
-    return is_open(middle, -1) ? SurfaceClass::kCeiling : SurfaceClass::kFloor;
+    const int up = steps_to_air(middle, 1), down = steps_to_air(middle, -1);
+    if (up > down) return SurfaceClass::kCeiling;
+    return slope > kFlat ? SurfaceClass::kFloor : SurfaceClass::kRamp;
   }
 
-  [[nodiscard]] bool is_open(const Vec3& p, double direction) const {
-    for (const double cells : {0.75, 1.25, 1.75, 2.25}) {
+  /// How many steps away from a level face the air begins that is open to the start; the cells
+  /// beside it are its own. Beyond a thin slab there is air as well, but farther.
+  [[nodiscard]] int steps_to_air(const Vec3& p, double direction) const {
+    constexpr int kMostSteps = 4;
+    for (int step = 0; step < kMostSteps; ++step) {
+      const double cells = 0.75 + 0.5 * step;
       const Eigen::Vector3i cell =
           air_.grid.cell_of(p + direction * cells * air_.grid.resolution_m * Vec3::UnitZ());
-      if (air_.grid.contains(cell) && air_.reachable[air_.grid.index(cell)]) return true;
+      if (air_.grid.contains(cell) && air_.reachable[air_.grid.index(cell)]) return step;
     }
-    return false;
+    return kMostSteps;
   }
 
   /// An object like this one, of that class.

@@ -71,9 +71,9 @@ TEST_F(FileErrors, FacesWithoutAreaAreDroppedAndCounted) {
 }
 
 TEST_F(FileErrors, NothingToReach) {
-  // A shaft of 0.8 x 0.8 m.
+  // A shaft of 0.5 x 0.5 m.
   const auto shaft = test::mapped(test::room(), [](const Vec3& p) -> Vec3 {
-    return {0.8 / 6 * p.x(), 0.8 / 5 * p.y(), p.z()};
+    return {0.5 / 6 * p.x(), 0.5 / 5 * p.y(), p.z()};
   });
   EXPECT_NE(said("x.ply", test::ply({shaft[0], shaft[1]}, test::PlyKind::kLittle)), "");
 }

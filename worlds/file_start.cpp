@@ -19,6 +19,7 @@ constexpr double kMostCells = 4e7;   // beyond, the cells grow
 constexpr double kHover = 0.8;       // where room is looked for, above the ground, m
 constexpr double kWanted = 0.7;      // room there that is as good as more, m
 constexpr double kOneFloor = 0.01;   // between levels that are the same, m
+constexpr double kOffRim = 2.0;       // from the world's rim to an origin that is meant, m
 constexpr double kLattice = 0.4;     // between the places that are tried, m
 constexpr double kFoot = 0.1;        // from the middle to a leg, along x and y, m
 constexpr double kUneven = 0.05;     // between the ground's heights under middle and legs, m
@@ -193,8 +194,8 @@ std::vector<Candidate> candidates(const World& world, const Ground& ground, cons
   const Bounds& bounds = world.bounds;
   // Those who make worlds to fly in put the vehicle at their origin.
   const Vec2 middle = 0.5 * (bounds.low + bounds.high).head<2>();
-  const bool has_origin =
-      (bounds.low.head<2>().array() < 0).all() && (bounds.high.head<2>().array() > 0).all();
+  const bool has_origin = (bounds.low.head<2>().array() < -kOffRim).all() &&
+                          (bounds.high.head<2>().array() > kOffRim).all();
   const Vec2 wanted = has_origin ? Vec2(0, 0) : middle;
   std::vector<Candidate> found;
   const Vec2 first = ((bounds.low.head<2>() - wanted) / kLattice).array().ceil();

@@ -83,7 +83,7 @@ FileScene read_contained(const FileRecipe& recipe, const std::string& ending) {
   ContainedLimits limits;
   // libsdformat takes 10 us for a byte.
   const bool sdf = ending == "sdf" || ending == "world";
-  limits.cpu_s = 3 + size_of(recipe.path) * (sdf ? 6e-5 : 1e-6);
+  limits.cpu_s = 1.5 + size_of(recipe.path) * (sdf ? 6e-5 : 1e-6);
   return FileScene::unpack(
       run_contained([&] { return read_scene(recipe, ending).pack(); }, limits));
 }

@@ -174,6 +174,20 @@ bool stands_level(const Ground& ground, const Vec2& p, double z) {
   return true;
 }
 
+/// Of uneven ground under a given place, the highest point that a leg may come to stand on: none
+/// begins inside it.
+double highest_under(const Ground& ground, const Vec2& p, double z) {
+  double highest = z;
+  for (double x = -1.5 * kFoot; x < 2 * kFoot; x += 0.5 * kFoot) {
+    for (double y = -1.5 * kFoot; y < 2 * kFoot; y += 0.5 * kFoot) {
+      for (const double h : ground.floors(p + Vec2(x, y))) {
+        if (h < z + kOnGround) highest = std::max(highest, h);
+      }
+    }
+  }
+  return highest;
+}
+
 struct Candidate {
   Vec3 p = Vec3::Zero();  ///< on the ground
   double room = 0;        ///< at most kWanted
@@ -288,7 +302,8 @@ FoundStart given(const World& world, const Ground& ground, const FileStart& star
     refuse(name, "leaves no room: the nearest surface is %.2f m from the standing vehicle",
            best_room);
   }
-  return {{so3::from_yaw(start.yaw_rad), Vec3(p.x(), p.y(), best)}, best_room, {}};
+  const double pad = highest_under(ground, p, best);
+  return {{so3::from_yaw(start.yaw_rad), Vec3(p.x(), p.y(), pad)}, best_room, {}};
 }
 
 double area_of(const FreeSpace& free) {

@@ -116,19 +116,22 @@ std::optional<LandingPlace> LandingFinder::find(const OccupancyMap2D& map, const
     return LandingPlace{kind, at_flight_height(explorer_, place->p, map)};
   };
   const double preferred_m = std::max(explorer_.stop.landing_clearance_m, footing_m_);
-  for (const auto& [kind, room_m] : {std::pair{LandingPlace::Kind::kClear, preferred_m},
-                                     {LandingPlace::Kind::kClear, footing_m_},
-                                     {LandingPlace::Kind::kToBeSeen, footing_m_}}) {
+  struct Demand {
+    LandingPlace::Kind kind;
+    double room_m;
+  };
+  for (const Demand demand : {Demand{LandingPlace::Kind::kClear, preferred_m},
+                              Demand{LandingPlace::Kind::kClear, footing_m_},
+                              Demand{LandingPlace::Kind::kToBeSeen, footing_m_}}) {
     if (query.last_resort) break;
+    const bool must_be_clear = demand.kind == LandingPlace::Kind::kClear;
     const auto place = std::find_if(places.begin(), places.end(), [&](const Place& p) {
-      if (p.room_m < room_m) return false;
-      const bool known = p.known_room_m >= footing_m_;
-      if (kind == LandingPlace::Kind::kClear && !known) return false;
+      if (p.room_m < demand.room_m) return false;
+      if (must_be_clear && p.known_room_m < footing_m_) return false;
       const LandingGround ground = assess(map, at_flight_height(explorer_, p.p, map));
-      return kind == LandingPlace::Kind::kClear ? ground == LandingGround::kClear
-                                                : ground != LandingGround::kObstructed;
+      return must_be_clear ? ground == LandingGround::kClear : ground != LandingGround::kObstructed;
     });
-    if (place != places.end()) return above(kind, place);
+    if (place != places.end()) return above(demand.kind, place);
   }
   const auto widest =
       std::max_element(places.begin(), places.end(),

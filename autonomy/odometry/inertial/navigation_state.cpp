@@ -96,11 +96,11 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
 NavigationState propagate(const NavigationState& x, const ImuInterval& imu) {
   const double dt = imu.dt_s();
   NavigationState y = x;
-  y.R_OB = x.R_OB * so3::Exp((imu.mean_gyro() - x.b_g) * dt);       // eq. (6)
-  const Vec3 a_begin = x.R_OB * (imu.accel_begin - x.b_a) + x.g_O;  // eq. (5)
+  y.R_OB = x.R_OB * so3::Exp((imu.mean_gyro() - x.b_g) * dt);       // eq. (7)
+  const Vec3 a_begin = x.R_OB * (imu.accel_begin - x.b_a) + x.g_O;  // eq. (6)
   const Vec3 a_end = y.R_OB * (imu.accel_end - x.b_a) + x.g_O;
-  const Vec3 a = 0.5 * (a_begin + a_end);             // eq. (7)
-  y.p_OB = x.p_OB + x.v_OB * dt + 0.5 * dt * dt * a;  // eq. (8)
+  const Vec3 a = 0.5 * (a_begin + a_end);             // eq. (8)
+  y.p_OB = x.p_OB + x.v_OB * dt + 0.5 * dt * dt * a;  // eq. (9)
   y.v_OB = x.v_OB + a * dt;                           // eq. (9)
   return y;
 }

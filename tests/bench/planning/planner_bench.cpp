@@ -1,4 +1,4 @@
-/// Random pillar fields of reference.md, section 10: success, limits and time of the local planner.
+/// Random pillar fields (support/pillar_field.h): success, limits and time of the local planner.
 ///
 ///     planner_bench [cases per setting] [seed] [folder]
 ///

@@ -26,7 +26,7 @@ FileScene read_pcd(const std::filesystem::path& file);
 FileScene read_octree(const std::filesystem::path& file);
 
 /// A Gazebo world or model by libsdformat. What is seen is what is felt: the visuals; a link
-/// without visuals stands for its collisions. The poses of a saved <state> hold.
+/// without visuals stands for its collisions. The poses of a saved `<state>` hold.
 /// @param model_paths where model:// is looked for, after the file's own folder and its parents
 FileScene read_sdf(const std::filesystem::path& file,
                    const std::vector<std::filesystem::path>& model_paths);

@@ -16,7 +16,7 @@
 /// Strict configuration: YAML <-> struct. A config struct lists its fields once, in
 ///
 ///     void fields(auto& f) {
-///       f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+///       f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, III-A)");
 ///       f.check(inflation_m >= 0, "inflation_m >= 0");
 ///     }
 ///

@@ -70,7 +70,7 @@ struct Decision {
   EnergyBalance energy;
 };
 
-/// Whoever says where to go next: from the 2D map and the vehicle's place to the next goal. A pure
+/// Decides where to go next: from the 2D map and the vehicle's place to the next goal. A pure
 /// function of the configuration, the seed and the inputs so far; called from one job at a time.
 class Explorer {
  public:

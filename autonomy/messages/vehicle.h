@@ -35,7 +35,7 @@ struct MountConfig {
 /// What the stack knows of its vehicle by weighing, measuring and calibrating: the belief, not the
 /// truth (models/arex/arex.xml). A test holds the two together.
 struct VehicleConfig {
-  double mass_kg = 1.9;  ///< paper, III-A
+  double mass_kg = 1.9;  ///< paper, II-A
   Vec3 rotor_offset_m{0.095, 0.1645,
                       0.0};            ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
   double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
@@ -46,9 +46,9 @@ struct VehicleConfig {
   double own_returns_margin_m = 0.105;
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
-  double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
+  double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, II-A)
   Vec3 camera_position_m{0.14, 0.0,
-                         0.07};   ///< p_BC, the left imager: above the LiDAR (paper, III-A)
+                         0.07};   ///< p_BC, the left imager: above the LiDAR (paper, II-A)
   double camera_pitch_rad = 0.0;  ///< positive looks down
   std::map<std::string, MountConfig> mounts;  ///< of further devices, by name
 
@@ -69,7 +69,7 @@ struct VehicleConfig {
   }
 
   void fields(auto& f) {
-    f("mass_kg", mass_kg, "all-up mass (paper, III-A)");
+    f("mass_kg", mass_kg, "all-up mass (paper, II-A)");
     f("rotor_offset_m", rotor_offset_m, "|x|, |y|, z of each rotor in B");
     f("thrust_coefficient", thrust_coefficient, "rotor thrust per squared speed, N/(rad/s)^2");
     f("torque_ratio_m", torque_ratio_m, "rotor drag torque per thrust");
@@ -78,7 +78,7 @@ struct VehicleConfig {
       "returns within this of the sphere are the vehicle's own, to the maps");
     f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
     f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
-    f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, III-A)");
+    f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, II-A)");
     f("camera_position_m", camera_position_m, "left imager in B");
     f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
     f("mounts", mounts,

@@ -4,7 +4,7 @@
 
 namespace arex {
 
-/// How the LiDAR errs, as its datasheet and a measured unit say (reference.md, 2).
+/// How the LiDAR errs, as its datasheet and a measured unit say (models/arex/README.md).
 struct LidarNoiseConfig {
   double range_std_m = 0.0034;
   double range_std_per_m = 0.00073;
@@ -22,10 +22,10 @@ struct LidarNoiseConfig {
   }
 
   void fields(auto& f) {
-    f("range_std_m", range_std_m, "range noise at zero range (reference.md, 2)");
-    f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (reference.md, 2)");
-    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (reference.md, 2)");
-    f("blind_m", blind_m, "nearer returns are dropped (reference.md, 5)");
+    f("range_std_m", range_std_m, "range noise at zero range (measured unit)");
+    f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (measured unit)");
+    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (datasheet: below 0.15)");
+    f("blind_m", blind_m, "nearer returns are dropped (FAST-LIO)");
     f("max_range_m", max_range_m, "further returns are dropped");
     f.check(range_std_m > 0 && angle_std_rad > 0, "range_std_m > 0, angle_std_rad > 0");
     f.check(max_range_m > blind_m && blind_m >= 0, "max_range_m > blind_m >= 0");
@@ -74,7 +74,7 @@ struct RegistrationConfig {
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
     f("max_points", max_points, "matched at most");
-    f("max_iterations", max_iterations, "of the iterated update (reference.md, 5)");
+    f("max_iterations", max_iterations, "of the iterated update (FAST-LIO)");
     f("converged_rad", converged_rad, "a smaller step of attitude ends the iterations");
     f("converged_m", converged_m, "a smaller step of position ends the iterations");
     f("gate_sigma", gate_sigma, "residuals beyond this many sigma of their innovation are refused");
@@ -117,8 +117,9 @@ struct OdometryHealthConfig {
       "worst direction of one scan's own information");
     f("degenerate_rotation_std_rad", degenerate_rotation_std_rad,
       "worst direction of one scan's own information");
-    f("lost_position_std_m", lost_position_std_m, "the filter's own doubt at which it is lost");
-    f("lost_rotation_std_rad", lost_rotation_std_rad, "the filter's own doubt at which it is lost");
+    f("lost_position_std_m", lost_position_std_m, "the filter's own deviation at which it is lost");
+    f("lost_rotation_std_rad", lost_rotation_std_rad,
+      "the filter's own deviation at which it is lost");
     f("degenerate_silence_s", degenerate_silence_s, "without a correction: degenerate");
     f("lost_silence_s", lost_silence_s, "without a correction: lost");
     f("lost_scans", lost_scans, "refused scans in a row: lost");

@@ -24,8 +24,8 @@ struct RegistrationReport {
   Vec3 worst_rotation_axis_B = Vec3::UnitZ();
 };
 
-/// One point per cell of a grid in L, the first in firing order; thinned evenly to at most
-/// `max_points`.
+/// One point per cell of a grid in L, the first in firing order; of these, evenly spaced ones,
+/// at most `max_points`.
 std::vector<ScanPoint> voxel_downsample(const std::vector<ScanPoint>& points, double voxel_m,
                                         int max_points);
 

@@ -59,7 +59,8 @@ class ScanCorrector {
   /// Forgets the map: whatever it came from, the vehicle has not left the ground yet.
   void start_again();
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
-  /// Before take-off the vehicle is where it started: ties the filter to that while it stands.
+  /// Before take-off the vehicle is where it started: holds the filter there, by a
+  /// pseudo-measurement, while it stands.
   void hold_standstill(Stamp until);
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
   void judge(const ScanUpdate& update);

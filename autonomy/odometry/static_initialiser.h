@@ -23,7 +23,7 @@ inline constexpr double kDefinedStd = 1e-5;
 
 /// Averages a window of standstill. O is placed at B, its z axis against the mean specific force,
 /// B's heading as x: by definition without error. So what an accelerometer bias makes of "down" is
-/// doubt about gravity in O, and tied to the doubt about the bias: gravity and bias are conditioned
+/// an error of gravity in O, correlated with that of the bias: gravity and bias are conditioned
 /// on what was measured and on gravity's known magnitude.
 ///
 /// The readings of a standing IMU are its bias and its noise, so the noise is measured as well: a

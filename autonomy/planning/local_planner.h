@@ -64,7 +64,7 @@ struct PlanCounts {
   }
 };
 
-/// Whoever plans from a state to a goal within the local grid. Called from one job at a time, in
+/// Plans from a state to a goal within the local grid. Called from one job at a time, in
 /// the order of time; same calls, same bits.
 class LocalPlanner {
  public:

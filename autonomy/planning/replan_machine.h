@@ -41,7 +41,7 @@ enum class StuckCause {
 [[nodiscard]] std::string_view to_string(StuckCause cause);
 
 struct ReplanConfig {
-  double check_rate_hz = 20.0;         ///< of tick(): collision check (paper, IV-A)
+  double check_rate_hz = 20.0;         ///< of tick(): collision check (paper, III-A)
   double horizon_m = 7.5;              ///< to the local target (EGO-Planner)
   double replan_after_m = 1.5;         ///< from the start of a trajectory (EGO-Planner)
   double no_replan_within_m = 2.0;     ///< of the goal (EGO-Planner)
@@ -60,7 +60,7 @@ struct ReplanConfig {
   int track_points = 60;
 
   void fields(auto& f) {
-    f("check_rate_hz", check_rate_hz, "collision checks (paper, IV-A)");
+    f("check_rate_hz", check_rate_hz, "collision checks (paper, III-A)");
     f("horizon_m", horizon_m, "to the local target");
     f("replan_after_m", replan_after_m, "distance flown on a trajectory before replanning");
     f("no_replan_within_m", no_replan_within_m, "distance to the goal below which none is needed");
@@ -106,7 +106,7 @@ struct PlannerEvent {
 };
 
 /// Flies to targets by replanning: INIT, WAIT_TARGET, GEN_NEW_TRAJ, REPLAN_TRAJ, EXEC_TRAJ,
-/// EMERGENCY_STOP (reference.md, section 6). Driven by stamps only: tick() at check_rate_hz with
+/// EMERGENCY_STOP (EGO-Planner's states). Driven by stamps only: tick() at check_rate_hz with
 /// the newest grid, setpoint() at the controller's rate. A plan made at a tick takes effect
 /// planning_latency_s later, from the state that the trajectory then in force has at that moment:
 /// position, velocity and acceleration are continuous.
@@ -120,7 +120,7 @@ class ReplanMachine {
   ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner, const YawConfig& yaw,
                 std::uint64_t seed, std::unique_ptr<LocalPlanner> other = nullptr);
 
-  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  /// Takes the vehicle over at rest at the setpoint of another module.
   void start_at(const Vec3& p_OB, double yaw_rad, Stamp now);
 
   /// A new target; `guide` is a polyline in O that leads there (empty: straight).

@@ -23,7 +23,7 @@ class Navigator {
   Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs, std::uint64_t seed,
             std::unique_ptr<LocalPlanner> planner = nullptr);
 
-  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  /// Takes the vehicle over at rest at the setpoint of another module.
   void take_over(const TrajectorySetpoint& from, Stamp now);
   /// A new goal. @pre the request is a kGoTo.
   void fly_to(const MotionRequest& request, const Odometry& odometry,

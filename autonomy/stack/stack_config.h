@@ -72,7 +72,7 @@ struct MappingConfig {
   static constexpr double kOctomapReach = 32767;    ///< its keys have 16 bits an axis
 
   bool enabled = true;
-  double resolution_m = 0.1;  ///< paper, IV-A
+  double resolution_m = 0.1;  ///< paper, III-A
   double latency_s = 0.020;   ///< modelled compute time of one frame
   double depth_rate_hz = 10;
   double map_2d_rate_hz = 2;
@@ -83,7 +83,7 @@ struct MappingConfig {
 
   void fields(auto& f) {
     f("enabled", enabled, "local grid, OctoMap and 2D map: what the planner and the explorer need");
-    f("resolution_m", resolution_m, "of the grids (paper, IV-A)");
+    f("resolution_m", resolution_m, "of the grids (paper, III-A)");
     f("latency_s", latency_s, "modelled compute time of one frame");
     f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
     f("map_2d_rate_hz", map_2d_rate_hz, "how often the 2D map is handed on");
@@ -108,7 +108,7 @@ struct MappingConfig {
 };
 
 struct PlanningConfig {
-  double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, IV-A)
+  double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, III-A)
   double ceiling_m = 10;         ///< z in O, as a geofence's height is above home
   double floor_m = -20;          ///< z in O
   double guide_rate_hz = 1.0;    ///< a new guide while the map grows
@@ -120,7 +120,7 @@ struct PlanningConfig {
   GuideConfig guide;
 
   void fields(auto& f) {
-    f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+    f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, III-A)");
     f("ceiling_m", ceiling_m,
       "highest z in O (above where the vehicle stood) of goals and planned ways, whatever the "
       "ground below does");

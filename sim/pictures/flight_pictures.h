@@ -31,7 +31,7 @@ class FlightPictures {
   [[nodiscard]] Pose vehicle_at(double time_s) const;
   [[nodiscard]] PictureOverlay overlay(double time_s, double path_until_s, double radius_m) const;
 
-  std::vector<TimedPose> path_;  ///< X_WB, thinned
+  std::vector<TimedPose> path_;  ///< X is X_WB; downsampled
   View view_;
   PictureOptions options_;
   // One each: what the top view cuts away is drawn into the shadows once, not once a frame.

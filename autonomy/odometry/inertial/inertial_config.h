@@ -20,15 +20,15 @@ struct ImuNoiseConfig {
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
     f("gyro_noise_density", gyro_noise_density,
-      "rad/s/sqrt(Hz): half as much again as the white noise of the sensor (reference.md, 4), for "
-      "aliased vibration; more lets scans of a small scene tilt a vehicle that stands still. A "
+      "rad/s/sqrt(Hz): half as much again as the white noise of the sensor, 1e-4, for aliased "
+      "vibration; more lets scans of a small scene tilt a vehicle that stands still. A "
       "start that measures more noise than this raises it and the walk's by the same factor");
     f("gyro_scale_noise_density", gyro_scale_noise_density,
       "1/sqrt(Hz), times the rate: errors of scale and alignment");
     f("accel_noise_density", accel_noise_density,
       "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and the vibration that its filter aliases");
-    f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz) (reference.md, 4)");
-    f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz) (reference.md, 4)");
+    f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz): the sensor's");
+    f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz): the sensor's");
     f("gyro_range_radps", gyro_range_radps,
       "full scale of the gyro, 2000 deg/s; a lower one is noticed");
     f("clipped_gyro_noise_density", clipped_gyro_noise_density,
@@ -56,8 +56,8 @@ struct StaticInitialiserConfig {
 
   void fields(auto& f) {
     f("window_s", window_s, "standstill that is averaged");
-    f("max_gyro_std_radps", max_gyro_std_radps, "a window that shakes more starts again");
-    f("max_accel_std_mps2", max_accel_std_mps2, "a window that shakes more starts again");
+    f("max_gyro_std_radps", max_gyro_std_radps, "a window of a larger deviation starts again");
+    f("max_accel_std_mps2", max_accel_std_mps2, "a window of a larger deviation starts again");
     f("max_gyro_mean_radps", max_gyro_mean_radps, "a window that turns faster starts again");
     f("still_rate_radps", still_rate_radps,
       "after the start, a scan's mean rate below this is still standstill, as far as force allows");

@@ -13,7 +13,7 @@
 ///
 /// Error state, 24x1: [R_OB, p_OB, v_OB, b_g, b_a, g_O | R_BL, p_BL], rotation errors on the right
 /// (R <- R Exp(d)). The last six are the optional online extrinsics; with zero covariance they stay
-/// where they are. Source: Xu and Zhang, FAST-LIO, RA-L 2021; paper.tex eqs. (2)-(3), (6)-(9).
+/// where they are. Source: Xu and Zhang, FAST-LIO, RA-L 2021; AREX paper, eqs. (2)-(3), (6)-(9).
 namespace arex {
 
 struct NavigationState {
@@ -79,7 +79,7 @@ NavigationState propagate(const NavigationState& x, const ImuInterval& imu);
 
 /// Jacobians of propagate() by the error state and by the noise [gyro, accel, gyro walk, accel
 /// walk]: the exact form of the paper's eq. (3) for the midpoint. The paper's A(u)^T is the right
-/// Jacobian of SO(3). Its rows keep first order in dt; the midpoint adds the dt^2/2 of eq. (8).
+/// Jacobian of SO(3). Its rows keep first order in dt; the midpoint adds the dt^2/2 of eq. (9).
 struct PropagationJacobians {
   ErrorMatrix F;
   NoiseJacobian G;

@@ -59,7 +59,7 @@ struct Standstill {
 [[nodiscard]] WhiteNoise white_noise(std::span<const ImuSample> samples);
 
 /// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
-/// of a worse grade, and its bias, which standing for a second cannot tell, wanders in proportion.
+/// of a worse grade, and its bias, which standing for a second cannot tell, walks in proportion.
 [[nodiscard]] ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured);
 
 }  // namespace arex

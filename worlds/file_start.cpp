@@ -1,9 +1,10 @@
 #include "worlds/file_start.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <tuple>
 
@@ -162,7 +163,7 @@ Space space_of(const World& world, double radius_m) {
   return space;
 }
 
-bool stands_level(const Ground& ground, const Vec2& p, double z) {
+bool is_level_at(const Ground& ground, const Vec2& p, double z) {
   for (const Vec2& leg :
        {Vec2(kFoot, kFoot), Vec2(-kFoot, kFoot), Vec2(kFoot, -kFoot), Vec2(-kFoot, -kFoot)}) {
     const std::vector<double> heights = ground.heights(p + leg);
@@ -245,7 +246,7 @@ FoundStart search(const World& world, const Ground& ground, Space& space, double
     const Eigen::Vector3i cell = cell_above(free, candidate.p);
     if (!free.grid.contains(cell) || free.reachable[free.grid.index(cell)]) continue;
     if (++tests > kMostLevelTests) break;
-    if (!stands_level(ground, candidate.p.head<2>(), candidate.p.z())) continue;
+    if (!is_level_at(ground, candidate.p.head<2>(), candidate.p.z())) continue;
     const std::size_t volume = flood(free, cell);
     if (volume <= best_volume) continue;
     best_volume = volume;
@@ -258,10 +259,8 @@ FoundStart search(const World& world, const Ground& ground, Space& space, double
       {so3::from_yaw(yaw_rad), *best}, room_at(world, *best + 0.5 * Vec3::UnitZ(), best->z()), {}};
 }
 
-[[noreturn]] void refuse(const std::string& start, const char* format, double value) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  throw ConfigError("file.start.position_m " + start + " " + text.data());
+[[noreturn]] void refuse(const std::string& start, const std::string& why) {
+  throw ConfigError("file.start.position_m " + start + " " + why);
 }
 
 FoundStart given(const World& world, const Ground& ground, const FileStart& start,
@@ -282,9 +281,8 @@ FoundStart given(const World& world, const Ground& ground, const FileStart& star
       if (!(std::abs(h - z) >= std::abs(best - z))) best = h;
     }
     if (std::abs(best - z) > kOnGround) {
-      refuse(name,
-             best < z ? "is in the air, %.2f m above the ground" : "is %.2f m below the ground",
-             std::abs(best - z));
+      refuse(name, best < z ? fmt::format("is in the air, {:.2f} m above the ground", z - best)
+                            : fmt::format("is {:.2f} m below the ground", best - z));
     }
     best_room = room_at(world, {p.x(), p.y(), best + 0.5}, best);
   } else {
@@ -299,8 +297,9 @@ FoundStart given(const World& world, const Ground& ground, const FileStart& star
     }
   }
   if (best_room < radius_m) {
-    refuse(name, "leaves no room: the nearest surface is %.2f m from the standing vehicle",
-           best_room);
+    refuse(name,
+           fmt::format("leaves no room: the nearest surface is {:.2f} m from the standing vehicle",
+                       best_room));
   }
   const double pad = highest_under(ground, p, best);
   return {{so3::from_yaw(start.yaw_rad), Vec3(p.x(), p.y(), pad)}, best_room, {}};

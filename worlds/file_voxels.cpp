@@ -1,5 +1,7 @@
 #include "worlds/file_voxels.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -34,11 +36,9 @@ VoxelBox box_around(const Eigen::Matrix<std::int64_t, 3, 1>& low,
       (high - low).array() + std::int64_t{2};  // high is behind the last cell; the rim
   const double cells = size.cast<double>().prod();
   if (!(cells <= kMostCells)) {
-    char text[120];
-    std::snprintf(text, sizeof(text),
-                  "spans %.1e cells of %g m, expected at most %.0e; see file.voxel_m, file.scale",
-                  cells, voxel_m, kMostCells);
-    throw ConfigError(text);
+    throw ConfigError(fmt::format(
+        "spans {:.1e} cells of {:g} m, expected at most {:.0e}; see file.voxel_m, file.scale",
+        cells, voxel_m, kMostCells));
   }
   VoxelBox box;
   box.first = (low.array() - std::int64_t{1}).cast<int>();

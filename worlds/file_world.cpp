@@ -1,9 +1,9 @@
 #include "worlds/file_world.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -31,16 +31,6 @@ constexpr double kHeadroom = 3.0;  // of air above the highest surface, m
 constexpr double kLevel = 0.7;     // |n.z| of what may be floor or ceiling
 constexpr double kFlat = 0.97;     // |n.z| of a floor that is no ramp: 14 degrees
 constexpr int kRound = 32;         // sides of what is round
-
-std::string text_of(const char* format, ...) __attribute__((format(printf, 1, 2)));
-std::string text_of(const char* format, ...) {
-  std::array<char, 400> text{};
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text.data(), text.size(), format, arguments);
-  va_end(arguments);
-  return text.data();
-}
 
 std::string ending_of(const fs::path& file) {
   std::string ending = file.extension().string();
@@ -118,15 +108,15 @@ Levelness levelness(const FileScene& scene, Eigen::Index axis) {
 
 /// Many a COLLADA or OBJ file has other axes than it says, for Gazebo and others do not ask. Where
 /// its surfaces lie level the other way round, and it would stand on its edge, they are believed.
-FileUp believed_up(FileUp up, bool primitives, const FileScene& scene, std::string& note) {
+FileUp choose_up(FileUp up, bool primitives, const FileScene& scene, std::string& note) {
   if (primitives || (up != FileUp::kY && up != FileUp::kZ)) return up;
   const Eigen::Index said = up == FileUp::kY ? 1 : 2, other = up == FileUp::kY ? 2 : 1;
   const Levelness as_said = levelness(scene, said), as_other = levelness(scene, other);
   constexpr double kOnEdge = 10;  // as high as that many times what it would be otherwise
   const bool doubtful = as_other.area > as_said.area && as_said.height > kOnEdge * as_other.height;
   if (!doubtful) return up;
-  note = text_of(
-      "%c is taken as up, for along %c it would be %.0f m high and hardly level anywhere; "
+  note = fmt::format(
+      "{} is taken as up, for along {} it would be {:.0f} m high and hardly level anywhere; "
       "see file.up",
       said == 1 ? 'z' : 'y', said == 1 ? 'y' : 'z', as_said.height);
   return said == 1 ? FileUp::kZ : FileUp::kY;
@@ -267,17 +257,17 @@ void expect_fair_extent(const Bounds& bounds) {
   const Vec3 size = bounds.high - bounds.low;
   if (bounds.low.cwiseAbs().maxCoeff() > kFarthest ||
       bounds.high.cwiseAbs().maxCoeff() > kFarthest) {
-    throw ConfigError(
-        text_of("lies around (%.0f, %.0f, %.0f) m, expected within %.0e m of its "
-                "origin: see file.offset_m",
-                0.5 * (bounds.low.x() + bounds.high.x()), 0.5 * (bounds.low.y() + bounds.high.y()),
-                0.5 * (bounds.low.z() + bounds.high.z()), kFarthest));
+    throw ConfigError(fmt::format(
+        "lies around ({:.0f}, {:.0f}, {:.0f}) m, expected within {:.0e} m of its "
+        "origin: see file.offset_m",
+        0.5 * (bounds.low.x() + bounds.high.x()), 0.5 * (bounds.low.y() + bounds.high.y()),
+        0.5 * (bounds.low.z() + bounds.high.z()), kFarthest));
   }
   if (size.maxCoeff() > kLargest) {
     throw ConfigError(
-        text_of("is %.4g x %.4g x %.4g m large, expected at most %.0f: has it other "
-                "units? See file.scale",
-                size.x(), size.y(), size.z(), kLargest));
+        fmt::format("is {:.4g} x {:.4g} x {:.4g} m large, expected at most {:.0f}: has it other "
+                    "units? See file.scale",
+                    size.x(), size.y(), size.z(), kLargest));
   }
 }
 
@@ -444,7 +434,7 @@ FileWorld load(const FileRecipe& recipe, double vehicle_radius_m) {
   if (recipe.up != FileUpAxis::kAuto) {
     up = static_cast<FileUp>(static_cast<int>(recipe.up));
   } else if (scene.voxel_m == 0) {
-    up = believed_up(up, !scene.primitives.empty(), scene, doubt);
+    up = choose_up(up, !scene.primitives.empty(), scene, doubt);
   }
   out.up = enum_names(FileUpAxis{})[static_cast<std::size_t>(up)];
   place(recipe, up, scene);
@@ -486,12 +476,13 @@ FileWorld load_file_world(const FileRecipe& recipe, double vehicle_radius_m) {
 std::string describe(const FileWorld& loaded) {
   const World& world = loaded.world;
   const Vec3 low = world.bounds.low, high = world.bounds.high;
-  std::string text = text_of(
-      "%s: %zu triangles, %zu objects, %zu collision shapes; z up from %s%s\n",
-      loaded.format.c_str(), world.mesh.triangles.size(), world.objects.size(),
-      world.collision_shapes.size(), loaded.up.c_str(), loaded.up_assumed ? " (assumed)" : "");
-  text += text_of("extent: %.2f x %.2f x %.2f m, from (%.2f, %.2f, %.2f)\n", high.x() - low.x(),
-                  high.y() - low.y(), high.z() - low.z(), low.x(), low.y(), low.z());
+  std::string text =
+      fmt::format("{}: {} triangles, {} objects, {} collision shapes; z up from {}{}\n",
+                  loaded.format, world.mesh.triangles.size(), world.objects.size(),
+                  world.collision_shapes.size(), loaded.up, loaded.up_assumed ? " (assumed)" : "");
+  text += fmt::format("extent: {:.2f} x {:.2f} x {:.2f} m, from ({:.2f}, {:.2f}, {:.2f})\n",
+                      high.x() - low.x(), high.y() - low.y(), high.z() - low.z(), low.x(), low.y(),
+                      low.z());
   text += "classes:";
   for (std::size_t i = 0; i < loaded.triangles_of_class.size(); ++i) {
     if (loaded.triangles_of_class[i] == 0) continue;
@@ -499,18 +490,18 @@ std::string describe(const FileWorld& loaded) {
             std::to_string(loaded.triangles_of_class[i]);
   }
   const Pose& X = world.X_WS;
-  text += text_of("\nstart: (%.2f, %.2f, %.2f) m, yaw %.2f rad, %s, %s%.2f m of room\n", X.p.x(),
-                  X.p.y(), X.p.z(), std::atan2(X.R(1, 0), X.R(0, 0)),
-                  loaded.start_found ? "found" : "given", loaded.start_room_m >= 2 ? "over " : "",
-                  loaded.start_room_m);
-  text += text_of(
-      "reachable: %.1f m^2 seen from above, %.1f m^3, from (%.2f, %.2f, %.2f) to "
-      "(%.2f, %.2f, %.2f)\n",
+  text += fmt::format(
+      "\nstart: ({:.2f}, {:.2f}, {:.2f}) m, yaw {:.2f} rad, {}, {}{:.2f} m of room\n", X.p.x(),
+      X.p.y(), X.p.z(), std::atan2(X.R(1, 0), X.R(0, 0)), loaded.start_found ? "found" : "given",
+      loaded.start_room_m >= 2 ? "over " : "", loaded.start_room_m);
+  text += fmt::format(
+      "reachable: {:.1f} m^2 seen from above, {:.1f} m^3, from ({:.2f}, {:.2f}, {:.2f}) to "
+      "({:.2f}, {:.2f}, {:.2f})\n",
       loaded.reachable_m2, loaded.reachable_m3, loaded.reachable.low.x(), loaded.reachable.low.y(),
       loaded.reachable.low.z(), loaded.reachable.high.x(), loaded.reachable.high.y(),
       loaded.reachable.high.z());
   if (loaded.dropped > 0) {
-    text += text_of("note: %zu faces without area left out\n", loaded.dropped);
+    text += fmt::format("note: {} faces without area left out\n", loaded.dropped);
   }
   for (const std::string& note : loaded.notes) text += "note: " + printable(note) + "\n";
   return text;

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <array>
 #include <bit>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <span>
 #include <string>
@@ -38,15 +36,8 @@ class Fingerprint {
 
   [[nodiscard]] std::uint64_t value() const { return state_; }
 
-  [[nodiscard]] std::string text() const {
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-    std::array<char, 17> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), "%016llx",
-                  static_cast<unsigned long long>(z ^ (z >> 31)));
-    return buffer.data();
-  }
+  /// 16 hexadecimal digits, mixed at the end.
+  [[nodiscard]] std::string text() const;
 
  private:
   std::uint64_t state_ = 0xCBF29CE484222325ULL;

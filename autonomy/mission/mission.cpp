@@ -1,15 +1,14 @@
 #include "mission/mission.h"
 
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace arex {
 namespace {
 
 std::string describe(const Vec3& p) {
-  std::array<char, 96> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.2f %.2f %.2f", p.x(), p.y(), p.z());
-  return buffer.data();
+  return fmt::format("{:.2f} {:.2f} {:.2f}", p.x(), p.y(), p.z());
 }
 
 /// What keeps the vehicle from arming; empty: nothing.
@@ -76,7 +75,7 @@ void Mission::wait_until_ready(const Inputs& inputs) {
   if (lacks.empty()) {
     enter(MissionState::kTakeoff, inputs);
   } else if (inputs.now - settled >= from_seconds(config_.ready_timeout_s)) {
-    be_stuck("not_ready: " + std::string(lacks));
+    end_stuck("not_ready: " + std::string(lacks));
     enter(MissionState::kDone, inputs);
   }
 }
@@ -87,7 +86,7 @@ void Mission::take_off(const Inputs& inputs) {
     enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
   } else if (stalls(inputs, (request_.goal_O - inputs.odometry.X_OB.p).norm(),
                     config_.takeoff_timeout_s)) {
-    be_stuck(inputs.armed ? "takeoff: height not reached" : "takeoff: not armed");
+    end_stuck(inputs.armed ? "takeoff: height not reached" : "takeoff: not armed");
     enter(inputs.armed ? MissionState::kLand : MissionState::kDone, inputs);
   }
 }
@@ -103,19 +102,19 @@ void Mission::land(const Inputs& inputs) {
       request_ = {MotionRequest::Kind::kDescend, request_.goal_O};
       progress_.begin(inputs.now);
     } else {
-      be_stuck("landing: not disarmed");
+      end_stuck("landing: not disarmed");
       enter(MissionState::kDone, inputs);
     }
   }
 }
 
-void Mission::be_stuck(const std::string& cause) {
+void Mission::end_stuck(const std::string& cause) {
   events_(EventKind::kStuck, cause);
   if (stuck_.empty()) stuck_ = cause;
 }
 
 void Mission::drop_target(const std::string& cause) {
-  be_stuck(cause);
+  end_stuck(cause);
   events_(EventKind::kTargetDropped, describe(request_.goal_O));
 }
 
@@ -211,7 +210,7 @@ void Mission::fly(const Inputs& inputs) {
   if (config_.kind == MissionConfig::Kind::kYawBurst) {
     spin(inputs);
   } else if (config_.waypoints_m.empty()) {
-    land_as_told(inputs);
+    land_on_command(inputs);
   } else if (planned ? inputs.progress == MotionProgress::kArrived : has_arrived(inputs)) {
     reach(inputs);
     next_waypoint(inputs);
@@ -233,7 +232,7 @@ void Mission::next_waypoint(const Inputs& inputs) {
   if (waypoint_ + 1 < config_.waypoints_m.size()) {
     select_waypoint(waypoint_ + 1, inputs.now);
   } else {
-    land_as_told(inputs);
+    land_on_command(inputs);
   }
 }
 
@@ -255,7 +254,7 @@ void Mission::explore(const Inputs& inputs) {
   // An explorer without a map says nothing.
   if (std::exchange(decided_, false)) progress_.begin(inputs.now);
   if (inputs.now - progress_.since() >= from_seconds(config_.ready_timeout_s)) {
-    be_stuck("no_map");
+    end_stuck("no_map");
     enter(MissionState::kLand, inputs);
     return;
   }
@@ -300,7 +299,7 @@ void Mission::go_home() {
   events_(EventKind::kTargetSelected, describe(request_.goal_O));
 }
 
-void Mission::land_as_told(const Inputs& inputs) {
+void Mission::land_on_command(const Inputs& inputs) {
   if (inputs.below != LandingGround::kObstructed) {
     enter(MissionState::kLand, inputs);
     return;
@@ -320,7 +319,7 @@ void Mission::fly_to_landing(const Inputs& inputs) {
   if (landing_query_) return;
   if (std::exchange(has_answer_, false)) {
     if (!landing_ || landing_->kind == LandingPlace::Kind::kWidest) {
-      be_stuck("no_landing_place");
+      end_stuck("no_landing_place");
     } else if (landing_->kind == LandingPlace::Kind::kToBeSeen) {
       events_(EventKind::kRecovery, "no clear place to land is known: looks at one");
     }
@@ -370,15 +369,13 @@ void Mission::spin(const Inputs& inputs) {
   const Stamp phase = (inputs.now - state_since_) / from_seconds(config_.yaw_burst_s);
   const auto burst = static_cast<std::size_t>(phase / 2);
   if (burst >= config_.yaw_rates_radps.size()) {
-    land_as_told(inputs);
+    land_on_command(inputs);
     return;
   }
   const double rate = phase % 2 == 0 ? config_.yaw_rates_radps[burst] : 0.0;
   if (request_.kind == MotionRequest::Kind::kSpin && request_.yaw_rate_radps == rate) return;
   request_ = {MotionRequest::Kind::kSpin, request_.goal_O, rate};
-  std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "yaw rate %.2f rad/s", rate);
-  events_(EventKind::kTargetSelected, text.data());
+  events_(EventKind::kTargetSelected, fmt::format("yaw rate {:.2f} rad/s", rate));
 }
 
 bool Mission::has_arrived(const Inputs& inputs) {

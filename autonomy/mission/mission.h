@@ -163,7 +163,7 @@ class Mission {
   void wait_until_ready(const Inputs& inputs);
   void take_off(const Inputs& inputs);
   void land(const Inputs& inputs);
-  void be_stuck(const std::string& cause);
+  void end_stuck(const std::string& cause);
   void drop_target(const std::string& cause);
   [[nodiscard]] bool stalls(const Inputs& inputs, double remaining_m, double timeout_s);
   [[nodiscard]] bool leg_stalls(const Inputs& inputs);
@@ -172,7 +172,7 @@ class Mission {
   void explore(const Inputs& inputs);
   void return_to_land(const Inputs& inputs);
   void go_home();
-  void land_as_told(const Inputs& inputs);
+  void land_on_command(const Inputs& inputs);
   void fly_to_landing(const Inputs& inputs);
   void fail_to_return(const Inputs& inputs);
   void try_another_landing(const Inputs& inputs);

@@ -18,7 +18,7 @@ int cores() {
   return sched_getaffinity(0, sizeof set, &set) == 0 ? std::max(1, CPU_COUNT(&set)) : 1;
 }
 
-std::filesystem::path or_shipped(const std::filesystem::path& file) {
+std::filesystem::path resolve_input_file(const std::filesystem::path& file) {
   namespace fs = std::filesystem;
   std::error_code none;
   if (file.empty() || file.is_absolute() || fs::exists(file, none)) return file;

@@ -9,7 +9,8 @@ namespace arex::app {
 namespace {
 
 sim::Scenario load(const ScenarioArguments& arguments) {
-  return sim::load_scenario(or_shipped(arguments.file), arguments.overrides, arguments.seed);
+  return sim::load_scenario(resolve_input_file(arguments.file), arguments.overrides,
+                            arguments.seed);
 }
 
 }  // namespace

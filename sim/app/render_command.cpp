@@ -1,7 +1,7 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -30,12 +30,6 @@ View view_named(const std::string& name) {
   return name == "both" ? View::kBoth : name == "top" ? View::kTop : View::kChase;
 }
 
-std::string format(const char* text, double a, double b, double c) {
-  std::array<char, 128> out{};
-  std::snprintf(out.data(), out.size(), text, a, b, c);
-  return out.data();
-}
-
 // Beginning and end, s; what reaches beyond the flight is cut.
 std::pair<double, double> span_of_film(const RenderArguments& arguments,
                                        const std::vector<sim::TimedPose>& truth) {
@@ -44,17 +38,18 @@ std::pair<double, double> span_of_film(const RenderArguments& arguments,
   const double begin = arguments.from_s.value_or(first);
   const double end = arguments.to_s.value_or(last);
   if (!(begin < last)) {
-    throw ConfigError(
-        format("--from %g: lies behind the end of the flight, expected %.2f to less than %.2f s",
-               begin, first, last));
+    throw ConfigError(fmt::format(
+        "--from {:g}: lies behind the end of the flight, expected {:.2f} to less than {:.2f} s",
+        begin, first, last));
   }
   if (!(end > first)) {
-    throw ConfigError(
-        format("--to %g: lies before the start of the flight, expected more than %.2f to %.2f s",
-               end, first, last));
+    throw ConfigError(fmt::format(
+        "--to {:g}: lies before the start of the flight, expected more than {:.2f} to {:.2f} s",
+        end, first, last));
   }
   if (!(begin < end)) {
-    throw ConfigError(format("--from %g: lies behind --to %g, expected it before", begin, end, 0));
+    throw ConfigError(
+        fmt::format("--from {:g}: lies behind --to {:g}, expected it before", begin, end));
   }
   return {std::max(begin, first), std::min(end, last)};
 }
@@ -65,8 +60,8 @@ void draw_still(const RenderArguments& arguments, const worlds::World& world, co
   const double end = truth.back().time_s;
   const double time = arguments.time_s.value_or(end / 2);
   if (!(time >= begin && time <= end)) {
-    throw ConfigError(
-        format("--time %g: lies outside of the flight, expected %.2f to %.2f s", time, begin, end));
+    throw ConfigError(fmt::format(
+        "--time {:g}: lies outside of the flight, expected {:.2f} to {:.2f} s", time, begin, end));
   }
   const View view = view_named(arguments.view.empty() ? "chase" : arguments.view);
   sim::FlightPictures pictures(world, X_WO, truth, view, {});

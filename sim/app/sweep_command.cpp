@@ -1,7 +1,7 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -33,11 +33,8 @@ constexpr double kPatience_s = 2;
 constexpr double kTaskPatience_s = 60;
 
 std::string clock_text(double seconds) {
-  std::array<char, 32> text{};
   const long whole = std::lround(seconds);
-  std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60,
-                whole % 60);
-  return text.data();
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
 /// The line that a person watches, and a line of its own for every run that breaks.
@@ -261,8 +258,8 @@ std::size_t array_size_of_cluster() {
 }  // namespace
 
 int sweep(const SweepArguments& arguments) {
-  const sim::SweepPlan plan =
-      sim::expand(sim::load_sweep_file(or_shipped(arguments.file)), sim::fingerprint(kSelf));
+  const sim::SweepPlan plan = sim::expand(sim::load_sweep_file(resolve_input_file(arguments.file)),
+                                          sim::content_hash_of_file(kSelf));
   if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 

@@ -1,4 +1,5 @@
-#include <array>
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdio>
 #include <string_view>
@@ -57,7 +58,7 @@ worlds::FileWorld build(const ConfigNode& root, const RecipeConfig& recipe, bool
     return built;
   } catch (const ConfigError& error) {
     if (direct) throw;
-    throw ConfigError(given_last(root) + ": " + error.what());
+    throw ConfigError(last_given(root) + ": " + error.what());
   }
 }
 
@@ -91,11 +92,10 @@ void draw_overview(const worlds::World& world, const std::filesystem::path& file
 void check_size(const ConfigNode& root, const worlds::World& world, double resolution_m) {
   const double cells = (world.bounds.high - world.bounds.low).prod() / std::pow(resolution_m, 3);
   if (cells <= kMostCells) return;
-  std::array<char, 120> text{};
-  std::snprintf(text.data(), text.size(),
-                "export.resolution_m makes %.1e cells of this world, expected at most %.0e", cells,
-                kMostCells);
-  config_detail::fail(config_detail::locate_rule(root, text.data()), text.data());
+  const std::string rule =
+      fmt::format("export.resolution_m makes {:.1e} cells of this world, expected at most {:.0e}",
+                  cells, kMostCells);
+  config_detail::fail(config_detail::locate_rule(root, rule), rule);
 }
 
 /// Nobody asked for a resolution: one that a large world can be written in.
@@ -119,12 +119,13 @@ void expect_no_run(const std::filesystem::path& folder) {
 
 int world(const WorldArguments& arguments) {
   const bool direct = !is_yaml(arguments.file);
-  ConfigNode root = direct ? recipe_of(arguments.file) : load_yaml(or_shipped(arguments.file));
+  ConfigNode root =
+      direct ? recipe_of(arguments.file) : load_yaml(resolve_input_file(arguments.file));
   for (const std::string& assignment : arguments.overrides) apply_override(root, assignment);
   RecipeConfig recipe;
   if (root.find("world")) {
     const sim::Scenario scenario =
-        sim::load_scenario(or_shipped(arguments.file), arguments.overrides, arguments.seed);
+        sim::load_scenario(resolve_input_file(arguments.file), arguments.overrides, arguments.seed);
     recipe.world = scenario.config.world;
     recipe.seed = scenario.config.seed;
   } else {

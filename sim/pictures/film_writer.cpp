@@ -1,6 +1,7 @@
 #include "pictures/film_writer.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -113,9 +114,7 @@ class FrameFolder : public FilmWriter {
   }
 
   void add(const Picture& frame) override {
-    std::array<char, 16> name{};
-    std::snprintf(name.data(), name.size(), "%06d.png", ++count_);
-    save_png(frame, folder_ / name.data());
+    save_png(frame, folder_ / fmt::format("{:06}.png", ++count_));
   }
 
   fs::path finish() override { return folder_; }

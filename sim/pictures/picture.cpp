@@ -166,7 +166,7 @@ Eigen::Matrix4f clip_from_camera(const PinholeCamera& camera) {
   return m;
 }
 
-float cut_of(const PictureOptions& options) {
+float cut_height(const PictureOptions& options) {
   return options.cut_above_m < kNoCut ? static_cast<float>(options.cut_above_m) : kNoCut;
 }
 
@@ -275,7 +275,7 @@ void PictureRenderer::Impl::draw_world(const Pose& X_WC, const PictureOptions& o
                      device->world_view->X_WC.p == X_WC.p && device->world_view->X_WC.R == X_WC.R;
   if (drawn) return;
   device->world_view.reset();
-  const float cut_above = cut_of(options);
+  const float cut_above = cut_height(options);
   auto visible = visible_chunks(chunks, ViewVolume(camera, X_WC, kFar));
   std::erase_if(visible, [&](std::uint32_t i) { return chunks[i].bounds.min().z() > cut_above; });
   const bool headlight =

@@ -1,8 +1,8 @@
 #include "run/recorder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -19,22 +19,14 @@ namespace {
 
 const std::string kTumHeader = "# time_s x_m y_m z_m qx qy qz qw ";
 
-/// A line as printf formats it. Lines of numbers only: none is longer than the buffer.
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  std::array<char, 512> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
-
 std::string tum_row(Stamp stamp, const Pose& X) {
   const Quat q = X.quaternion();
-  return line("%.9f %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n", to_seconds(stamp), X.p.x(), X.p.y(),
-              X.p.z(), q.x(), q.y(), q.z(), q.w());
+  return fmt::format("{:.9f} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n", to_seconds(stamp),
+                     X.p.x(), X.p.y(), X.p.z(), q.x(), q.y(), q.z(), q.w());
 }
 
 /// Whether a TUM file is one that a run has written, whatever its odometry source was called.
-bool begins_as_ours(const std::filesystem::path& file) {
+bool has_run_header(const std::filesystem::path& file) {
   std::string beginning(kTumHeader.size(), '\0');
   std::ifstream(file).read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
   return beginning == kTumHeader;
@@ -48,7 +40,7 @@ void remove_older_run(const std::filesystem::path& directory) {
     const bool ours = std::any_of(kRunFiles.begin(), kRunFiles.end(), [&](std::string_view file) {
       return name.starts_with(std::string(file) + ".") && name.ends_with(".partial");
     });
-    if (ours || (name.ends_with(".tum") && begins_as_ours(entry.path()))) {
+    if (ours || (name.ends_with(".tum") && has_run_header(entry.path()))) {
       drafts.push_back(entry.path());
     }
   }
@@ -130,7 +122,7 @@ void Recorder::append(GrowingFile& file, std::string_view text) {
 }
 
 void Recorder::event(const Event& event) {
-  append(events_, line("%.3f,", to_seconds(event.stamp)) +
+  append(events_, fmt::format("{:.3f},", to_seconds(event.stamp)) +
                       std::string(kEventKindNames[static_cast<std::size_t>(event.kind)]) + "," +
                       csv_quoted(event.detail) + "\n");
 }
@@ -149,11 +141,12 @@ void Recorder::sample(Stamp stamp, const FlightSample& sample) {
   }
   if (!sample.row) return;
   const FlightRow& row = *sample.row;
-  append(flight_,
-         line("%.3f,%.4f,%s,%.4f,%.5f,%s,%.4f,%.3f,%.1f,%.5f\n", to_seconds(row.stamp),
-              row.speed_mps, csv_number(row.tracking_error_m, 4).c_str(), row.odometry_error_m,
-              row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4).c_str(), row.height_m,
-              row.battery_voltage_v, row.battery_power_w, row.battery_fraction));
+  append(
+      flight_,
+      fmt::format("{:.3f},{:.4f},{},{:.4f},{:.5f},{},{:.4f},{:.3f},{:.1f},{:.5f}\n",
+                  to_seconds(row.stamp), row.speed_mps, csv_number(row.tracking_error_m, 4),
+                  row.odometry_error_m, row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4),
+                  row.height_m, row.battery_voltage_v, row.battery_power_w, row.battery_fraction));
 }
 
 void Recorder::decision(const Decision& decision) {
@@ -165,14 +158,14 @@ void Recorder::decision(const Decision& decision) {
                            name(kTargetEndNames, decision.previous_end) + "," +
                            name(kStopReasonNames, decision.stop_reason);
   const std::string begin =
-      line("%.3f,%d,", to_seconds(decision.stamp), decision.sequence) + head + ",";
+      fmt::format("{:.3f},{},", to_seconds(decision.stamp), decision.sequence) + head + ",";
   if (decision.candidates.empty()) append(decisions_, begin + ",,,,,,,,,\n");
   for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
     const Candidate& c = decision.candidates[i];
     append(decisions_,
-           begin + line("%zu,%d,%.2f,%.2f,%s,%.3f,%s\n", i, decision.winner == i ? 1 : 0,
-                        c.point.x(), c.point.y(), name(kVerdictNames, c.verdict).c_str(),
-                        c.information_m2, terms_of(c).c_str()));
+           begin + fmt::format("{},{},{:.2f},{:.2f},{},{:.3f},{}\n", i,
+                               decision.winner == i ? 1 : 0, c.point.x(), c.point.y(),
+                               name(kVerdictNames, c.verdict), c.information_m2, terms_of(c)));
   }
 }
 
@@ -191,7 +184,7 @@ void Recorder::write_cloud(const std::vector<Vec3f>& points_O,
   attempt([&] { write_pcd(directory_ / "cloud.pcd", points_O); });
   std::string csv = csv_header("cloud_growth.csv");
   for (const CloudGrowth& row : growth) {
-    csv += line("%.3f,%zu\n", to_seconds(row.stamp), row.points);
+    csv += fmt::format("{:.3f},{}\n", to_seconds(row.stamp), row.points);
   }
   write_file("cloud_growth.csv", csv);
 }

@@ -1,9 +1,9 @@
 #include "run/summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #ifndef AREX_VERSION
@@ -141,10 +141,8 @@ std::string odometry_error_csv(const std::vector<PosePair>& poses) {
     const Pose aligned = X_WO * poses[i].X_OB;
     const Vec3 p = aligned.p - poses[i].X_WB.p;
     const Vec3 r = so3::Log(aligned.R * poses[i].X_WB.R.transpose());
-    std::array<char, 160> line{};
-    std::snprintf(line.data(), line.size(), "%.3f,%.5f,%.5f,%.5f,%.6f,%.6f,%.6f\n",
-                  to_seconds(poses[i].stamp), p.x(), p.y(), p.z(), r.x(), r.y(), r.z());
-    text += line.data();
+    text += fmt::format("{:.3f},{:.5f},{:.5f},{:.5f},{:.6f},{:.6f},{:.6f}\n",
+                        to_seconds(poses[i].stamp), p.x(), p.y(), p.z(), r.x(), r.y(), r.z());
   }
   return text;
 }

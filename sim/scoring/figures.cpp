@@ -1,9 +1,9 @@
 #include "scoring/figures.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -102,9 +102,7 @@ std::string csv_header(std::string_view file) {
 
 std::string csv_number(double value, int decimals) {
   if (!std::isfinite(value)) return "";
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return text.data();
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 void Figures::set(std::string_view key, double value) { put(key, value); }

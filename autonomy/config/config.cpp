@@ -270,7 +270,7 @@ void apply_override(ConfigNode& root, const std::string& assignment) {
                                      config_detail::Positions::kName));
 }
 
-std::string given_last(const ConfigNode& section) {
+std::string last_given(const ConfigNode& section) {
   const ConfigNode* newest = &section;
   const auto visit = [&newest](const auto& self, const ConfigNode& node) -> void {
     if (node.order > newest->order) newest = &node;

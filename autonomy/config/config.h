@@ -66,7 +66,7 @@ void set_value(ConfigNode& root, const std::string& dotted_key, const std::strin
 void apply_override(ConfigNode& root, const std::string& assignment);
 
 /// Where the newest value of a section was given: the last override in it, or else the section.
-std::string given_last(const ConfigNode& section);
+std::string last_given(const ConfigNode& section);
 
 /// One parameter, as `arex params` prints it.
 struct ParameterInfo {

@@ -47,7 +47,8 @@ class ErrorStateFilter {
 
   /// Sets the covariance of pose and velocity anew and drops their correlations with the rest: for
   /// a recovery.
-  void doubt_pose(double rotation_std_rad, double position_std_m, double velocity_std_mps);
+  void inflate_pose_covariance(double rotation_std_rad, double position_std_m,
+                               double velocity_std_mps);
 
  private:
   struct Gain;

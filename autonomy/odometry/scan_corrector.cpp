@@ -36,14 +36,14 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   ScanUpdate update;
   update.begin = job.scan->stamp;
   update.stamp = job.scan->end;
-  if (stood_at_ && misses_imu(imu_.between(stamp_, update.stamp), update.stamp)) start_again();
+  if (stood_at_ && has_imu_gap(imu_.between(stamp_, update.stamp), update.stamp)) start_again();
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
     update.fractions = std::make_shared<const std::vector<float>>();
   } else {
     const std::vector<ScanPoint> points = register_with_motion(*job.scan, update);
-    judge(update);
+    update_status(update);
     std::vector<Vec3f> points_O;
     std::vector<float> fractions;
     if (update.registration.accepted && status_ != OdometryStatus::kLost &&
@@ -71,8 +71,8 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   const Stamp window_begin = scan->end - from_seconds(config_.initialiser.window_s);
   std::erase_if(standing_scans_, [&](const LidarScanPtr& s) { return s->stamp < window_begin; });
   const std::span<const ImuSample> samples = imu_.until(scan->end);
-  need_ = misses_imu(samples, scan->end) ? OdometryNeed::kImu
-                                         : missing_for_start(samples, config_.initialiser);
+  need_ = has_imu_gap(samples, scan->end) ? OdometryNeed::kImu
+                                          : missing_for_start(samples, config_.initialiser);
   const auto standing = start_from_standstill(samples, X_BL_, config_);
   if (need_ == OdometryNeed::kNothing && standing && !start(*standing, scan->end)) {
     need_ = scan->points.empty() ? OdometryNeed::kScan : OdometryNeed::kReference;
@@ -89,7 +89,7 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
 
 bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   white_noise_ = standing.white_noise;
-  config_.imu = graded(configured_imu_, white_noise_);
+  config_.imu = scaled_to_measured(configured_imu_, white_noise_);
   filter_ = ErrorStateFilter(config_.imu);
   filter_.reset(standing.state, standing.covariance);
   accel_scale_ = standing.accel_scale;
@@ -137,15 +137,15 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     if (stood_at_) hold_standstill(scan.end);
     std::vector<ScanPoint> points =
         undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
-    const std::vector<ScanPoint> thinned = voxel_downsample(
+    const std::vector<ScanPoint> downsampled = voxel_downsample(
         points, config_.registration.scan_voxel_m, config_.registration.max_points);
     update.gyro_clipped = clipped.any();
     Vec3 missing = Vec3::Zero();
     if (status_ == OdometryStatus::kLost) {
-      update.recovered = recover(thinned, update.registration);
+      update.recovered = recover(downsampled, update.registration);
     } else {
       const NavigationState predicted = filter_.state();
-      update.registration = register_scan(thinned, map_, config_, filter_);
+      update.registration = register_scan(downsampled, map_, config_, filter_);
       missing = missing_rates(gyro_.missing_radps, clipped,
                               local(predicted, filter_.state()).segment<3>(kRotation));
     }
@@ -190,7 +190,7 @@ void ScanCorrector::hold_standstill(Stamp until) {
   filter_.correct<9>(moved, H, variance.asDiagonal());
 }
 
-void ScanCorrector::judge(const ScanUpdate& update) {
+void ScanCorrector::update_status(const ScanUpdate& update) {
   const OdometryHealthConfig& hc = config_.health;
   const RegistrationReport& report = update.registration;
   if (report.accepted) {

@@ -63,7 +63,7 @@ class ScanCorrector {
   /// pseudo-measurement, while it stands.
   void hold_standstill(Stamp until);
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
-  void judge(const ScanUpdate& update);
+  void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
   [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;

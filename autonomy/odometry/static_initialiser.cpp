@@ -27,7 +27,8 @@ ErrorMatrix prior_covariance(const StaticInitialiserConfig& sc) {
 /// Adds doubt about the mounting. The map is made by the LiDAR, so O is where the map is: what the
 /// start fixes is the LiDAR's pose in O, and gravity in B. An error of the mounting is at first one
 /// of B's pose and of gravity in O as well, and only motion tells them apart.
-void doubt_mounting(const LidarInertialConfig& config, const NavigationState& x, ErrorMatrix& P) {
+void add_extrinsic_covariance(const LidarInertialConfig& config, const NavigationState& x,
+                              ErrorMatrix& P) {
   Eigen::Matrix<double, kErrorDim, 6> T = Eigen::Matrix<double, kErrorDim, 6>::Zero();
   T.block<3, 3>(kExtrinsicRotation, 0) = Mat3::Identity();
   T.block<3, 3>(kExtrinsicPosition, 3) = Mat3::Identity();
@@ -82,7 +83,7 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
   start.state = filter.state();
   start.covariance = filter.covariance();
   start.white_noise = standing->white_noise;
-  if (config.estimate_extrinsics) doubt_mounting(config, start.state, start.covariance);
+  if (config.estimate_extrinsics) add_extrinsic_covariance(config, start.state, start.covariance);
   return start;
 }
 

@@ -126,7 +126,7 @@ class CostMap {
 };
 
 /// Straightens where the straight line costs no more than the path between its ends.
-std::vector<Vec2> pull_straight(const CostMap& costs, std::span<const Vec2> path) {
+std::vector<Vec2> shortcut_path(const CostMap& costs, std::span<const Vec2> path) {
   std::vector<Vec2> kept{path.front()};
   std::size_t at = 0;
   while (at + 1 < path.size()) {
@@ -179,7 +179,7 @@ struct Foot {
   Vec3 point = Vec3::Zero();
 };
 
-Foot foot_on(std::span<const Vec3> path, const Vec3& p) {
+Foot project_on(std::span<const Vec3> path, const Vec3& p) {
   Foot best{0, path.front()};
   double best_distance = kInfinity;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
@@ -269,7 +269,7 @@ GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to
   path.front() = from;
   if (found) path.back() = to;
   if (path.size() == 1) path.push_back(found ? to : from);
-  result.points = pull_straight(costs, path);
+  result.points = shortcut_path(costs, path);
   return result;
 }
 
@@ -288,7 +288,7 @@ std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to
 
 double length_ahead(std::span<const Vec3> path, const Vec3& p) {
   if (path.empty()) return 0;
-  const Foot foot = foot_on(path, p);
+  const Foot foot = project_on(path, p);
   double length = (foot.point - p).norm();
   Vec3 at = foot.point;
   for (std::size_t i = foot.piece + 1; i < path.size(); ++i) {
@@ -300,7 +300,7 @@ double length_ahead(std::span<const Vec3> path, const Vec3& p) {
 
 Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m) {
   if (path.size() < 2) return path.empty() ? p : path.front();
-  const Foot foot = foot_on(path, p);
+  const Foot foot = project_on(path, p);
   Vec3 at = foot.point;
   for (std::size_t i = foot.piece; i + 1 < path.size(); ++i) {
     const double piece = (path[i + 1] - at).norm();

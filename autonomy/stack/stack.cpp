@@ -165,7 +165,7 @@ void Stack::start_again(Stamp jumped_at) {
   navigating_ = false;  // whoever flies next starts from the setpoint
 }
 
-Odometry Stack::believed() const {
+Odometry Stack::checked_odometry() const {
   Odometry odometry = odometry_;
   if (now_ - odometry.stamp > kOdometryStale) odometry.status = OdometryStatus::kLost;
   return odometry;
@@ -191,9 +191,10 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ = mission_.update({now_, believed(), odometry_need(), autopilot_.ready, autopilot_.armed,
-                              serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                              navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
+  request_ =
+      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
+                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
+                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
   setpoint_ = move(request_);
   return control(request_);
 }

@@ -70,7 +70,7 @@ class Stack : public FlightSoftware {
   /// The pose has jumped: the map around the vehicle and the way through it begin anew.
   void start_again(Stamp jumped_at);
   /// The estimate as far as it can be believed now.
-  [[nodiscard]] Odometry believed() const;
+  [[nodiscard]] Odometry checked_odometry() const;
   [[nodiscard]] OdometryNeed odometry_need() const;
   void decide();
   void seek_landing();

@@ -19,7 +19,8 @@ ConfigNode without(ConfigNode section, std::initializer_list<std::string_view> k
 }
 
 /// Where a scenario says something, or else it itself.
-std::string where_said(const ConfigNode& scenario, std::string_view section, std::string_view key) {
+std::string location_of(const ConfigNode& scenario, std::string_view section,
+                        std::string_view key) {
   const ConfigNode* node = scenario.find(section);
   if (node) node = node->find(key);
   return node ? node->where : scenario.where;
@@ -92,12 +93,12 @@ void check_modules(const StackConfig& config, const ConfigNode& scenario) {
   const Modules& all = arex::modules();
   if (!config.odometries.contains(config.odometry.source)) {
     static_cast<void>(
-        all.odometry.at(config.odometry.source, where_said(scenario, "odometry", "source")));
+        all.odometry.at(config.odometry.source, location_of(scenario, "odometry", "source")));
   }
   static_cast<void>(all.explorers.at(config.exploration.strategy,
-                                     where_said(scenario, "exploration", "strategy")));
+                                     location_of(scenario, "exploration", "strategy")));
   static_cast<void>(
-      all.planners.at(config.planning.strategy, where_said(scenario, "planning", "strategy")));
+      all.planners.at(config.planning.strategy, location_of(scenario, "planning", "strategy")));
 }
 
 StackConfig with_shared_values(StackConfig config) {

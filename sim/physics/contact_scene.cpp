@@ -55,7 +55,7 @@ std::string scene_xml(const worlds::HeightField& terrain, double relief_m, int s
   return xml.str();
 }
 
-bool has_felt_mesh(const worlds::World& world) {
+bool has_contact_mesh(const worlds::World& world) {
   return std::any_of(world.objects.begin(), world.objects.end(),
                      [](const worlds::Object& object) { return object.felt; });
 }
@@ -210,7 +210,7 @@ ContactScene::ContactScene(const worlds::World& world, const ContactConfig& conf
       config_(config),
       index_(world.collision_shapes),
       model_(with_body(compile_model(scene_xml(world.terrain, relief(world.terrain), config.slots,
-                                               has_felt_mesh(world))),
+                                               has_contact_mesh(world))),
                        body)),
       airframe_(read_airframe(*model_, body)),
       mesh_(world, airframe_.shapes),

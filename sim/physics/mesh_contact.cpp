@@ -117,7 +117,7 @@ std::span<const MeshTouch> MeshContacts::find(const Pose& X_WB) {
   if (tree_.empty()) return {};
   follow_middle(X_WB.p);
   for (std::uint32_t shape = 0; shape < skeletons_.size(); ++shape) touch(shape, X_WB);
-  thin_out();
+  keep_deepest();
   return touches_;
 }
 
@@ -327,7 +327,7 @@ void MeshContacts::add(MeshTouch touch) {
   touches_.push_back(touch);
 }
 
-void MeshContacts::thin_out() {
+void MeshContacts::keep_deepest() {
   if (touches_.size() <= kMost) return;
   std::stable_sort(touches_.begin(), touches_.end(),
                    [](const MeshTouch& a, const MeshTouch& b) { return a.depth_m > b.depth_m; });

@@ -86,7 +86,7 @@ class MeshContacts {
   [[nodiscard]] bool is_nearest(const Vec3& on_skeleton, const Vec3& on_face,
                                 double distance) const;
   void add(MeshTouch touch);
-  void thin_out();
+  void keep_deepest();
 
   const worlds::World& world_;
   const std::vector<worlds::CollisionShape>& airframe_;

@@ -16,7 +16,7 @@ bool has_gap(std::span<const ImuSample> samples) {
                             }) != samples.end();
 }
 
-bool misses_imu(std::span<const ImuSample> samples, Stamp until) {
+bool has_imu_gap(std::span<const ImuSample> samples, Stamp until) {
   // By as much again the IMU's clock may be off.
   const Stamp lag = 2 * kMaxImuGap;
   return samples.empty() || until - samples.back().stamp > lag || has_gap(samples);

@@ -14,7 +14,7 @@ inline constexpr Stamp kMaxImuGap = kNanosecondsPerSecond / 20;
 [[nodiscard]] bool has_gap(std::span<const ImuSample> samples);
 
 /// Whether they have a gap, or end long before `until`.
-[[nodiscard]] bool misses_imu(std::span<const ImuSample> samples, Stamp until);
+[[nodiscard]] bool has_imu_gap(std::span<const ImuSample> samples, Stamp until);
 
 /// The samples that an estimator still needs, in order of time.
 class ImuBuffer {

@@ -60,7 +60,7 @@ WhiteNoise white_noise(std::span<const ImuSample> samples) {
   return {std::sqrt(gyro * share), std::sqrt(accel * share)};
 }
 
-ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured) {
+ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured) {
   const double gyro = std::max(1.0, measured.gyro / imu.gyro_noise_density);
   const double accel = std::max(1.0, measured.accel / imu.accel_noise_density);
   imu.gyro_noise_density *= gyro;

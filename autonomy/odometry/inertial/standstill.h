@@ -60,6 +60,6 @@ struct Standstill {
 
 /// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
 /// of a worse grade, and its bias, which standing for a second cannot tell, walks in proportion.
-[[nodiscard]] ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured);
+[[nodiscard]] ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured);
 
 }  // namespace arex

@@ -41,7 +41,7 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
   result.coverage.emplace();
   result.flight.thin.emplace();
   result.plans.plans = 1;
-  result.timing = {summarise("replan", std::vector<float>())};
+  result.timing = {timing_row("replan", std::vector<float>())};
   std::set<std::string> counts{"map.points",
                                "map.scored",
                                "map.foliage",
@@ -71,8 +71,8 @@ TEST(Summary, HasEveryFigureOfTheListAndNoOther) {
 
 TEST(Summary, AModuleThatNeverRanHasNoTime) {
   EXPECT_EQ(
-      timing_csv(
-          {summarise("depth", std::vector<float>()), summarise("imu", std::vector<float>{0.001F})}),
+      timing_csv({timing_row("depth", std::vector<float>()),
+                  timing_row("imu", std::vector<float>{0.001F})}),
       "module,calls,median_ms,p99_ms,total_s\ndepth,0,,,0.0000\nimu,1,1.0000,1.0000,0.0010\n");
 }
 

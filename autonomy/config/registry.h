@@ -78,6 +78,13 @@ class Registry {
   std::vector<Type> types_;
 };
 
+/// What a section says, over values given.
+template <class Config>
+Config read_over(Config config, const ConfigNode& section) {
+  read_config(section, config);
+  return config;
+}
+
 /// For modules without parameters of their own.
 struct NoParameters {
   void fields(auto& /*f*/) {}

@@ -16,12 +16,6 @@
 namespace arex {
 namespace {
 
-template <class Config>
-Config read_over(Config config, const ConfigNode& section) {
-  read_config(section, config);
-  return config;
-}
-
 // Sources and explorers that ship have their parameters under `odometry` and `exploration`. A
 // section of a further source says only what differs from these.
 void register_shipped(Modules& to) {

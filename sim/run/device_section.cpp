@@ -2,15 +2,15 @@
 
 #include <utility>
 
+#include "run/device_types.h"
+
 namespace arex::sim {
 
 void DeviceSection::read(std::string_view name, const ConfigNode& section) {
   const ConfigNode* named = section.find("type");
   if (named) config_detail::parse_scalar(*named, "type", type);
-  if (type != "mid360" && type != "d430") {
-    throw ConfigError((named ? named->where : section.where) + ": device '" + std::string(name) +
-                      "' has the type '" + type + "', expected mid360 or d430");
-  }
+  const std::string where =
+      (named ? named->where : section.where) + ": device '" + std::string(name) + "'";
   own = section;
   own.entries.clear();
   for (const ConfigNode::Entry& entry : section.entries) {
@@ -21,27 +21,14 @@ void DeviceSection::read(std::string_view name, const ConfigNode& section) {
     else if (entry.key != "type")
       own.entries.push_back(entry);
   }
-  if (type == "mid360") static_cast<void>(over(LidarConfig()));
-  if (type == "d430") static_cast<void>(over(DepthConfig()));
-}
-
-LidarConfig DeviceSection::over(LidarConfig first) const {
-  read_config(own, first);
-  return first;
-}
-
-DepthConfig DeviceSection::over(DepthConfig first) const {
-  read_config(own, first);
-  return first;
+  static_cast<void>(device_types().at(type, where).parameters(own));
 }
 
 std::vector<ParameterInfo> DeviceSection::parameters() const {
-  std::vector<ParameterInfo> all{{"type", type, "", "mid360 or d430"}};
+  const auto& made = device_types().at(type, "devices");
+  std::vector<ParameterInfo> all{{"type", type, "", made.meaning}};
   for (ParameterInfo& parameter : list_parameters(mount)) all.push_back(std::move(parameter));
-  for (ParameterInfo& parameter :
-       type == "mid360" ? given_parameters<LidarConfig>(own) : given_parameters<DepthConfig>(own)) {
-    all.push_back(std::move(parameter));
-  }
+  for (ParameterInfo& parameter : made.parameters(own)) all.push_back(std::move(parameter));
   return all;
 }
 

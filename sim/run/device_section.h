@@ -37,17 +37,14 @@ struct DepthConfig {
   }
 };
 
-/// A further device: its type, where it sits, and what differs from `lidar` or `depth`.
+/// A further device: its type (device_types.h), where it sits, and its own parameters.
 struct DeviceSection {
-  std::string type;  ///< mid360 or d430
+  std::string type;
   MountConfig mount;
-  ConfigNode own;  ///< of its type
+  ConfigNode own;
 
   void read(std::string_view name, const ConfigNode& section);
   [[nodiscard]] std::vector<ParameterInfo> parameters() const;
-  /// Its parameters over those of the first of its type. @pre of that type
-  [[nodiscard]] LidarConfig over(LidarConfig first) const;
-  [[nodiscard]] DepthConfig over(DepthConfig first) const;
 };
 
 }  // namespace arex::sim

@@ -1,11 +1,12 @@
 #include "run/scenario.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
+#include "config/registry.h"
 #include "run/moved_keys.h"
 
 namespace arex::sim {
@@ -24,16 +25,13 @@ std::string fault_of(const Vec3& p_O, const worlds::World& world) {
   const Vec3 p_W = start_pose(world) * p_O;
   const Vec2 beyond =
       (p_W - world.bounds.high).head<2>().cwiseMax((world.bounds.low - p_W).head<2>());
-  std::array<char, 96> text{};
   if (beyond.maxCoeff() > 0) {
-    std::snprintf(text.data(), text.size(), "lies %.2f m outside the world", beyond.maxCoeff());
-    return text.data();
+    return fmt::format("lies {:.2f} m outside the world", beyond.maxCoeff());
   }
   const bool has_terrain = world.terrain.columns > 0;
   const double ground = has_terrain ? world.terrain.at(p_W.x(), p_W.y()) : world.bounds.low.z();
   if (p_W.z() >= ground) return {};
-  std::snprintf(text.data(), text.size(), "lies %.2f m below the ground", ground - p_W.z());
-  return text.data();
+  return fmt::format("lies {:.2f} m below the ground", ground - p_W.z());
 }
 
 void check_points(const Scenario& scenario, const worlds::World& world, const std::string& list,
@@ -79,7 +77,7 @@ auto at_world(const ConfigNode& source, const auto& build) {
     return build();
   } catch (const ConfigError& error) {
     const ConfigNode* node = source.find("world");
-    throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
+    throw ConfigError(last_given(node ? *node : source) + ": " + error.what());
   }
 }
 
@@ -117,8 +115,8 @@ double ScenarioConfig::mapped_frames_hz() const {
   };
   frames += depth_frames(depth);
   for (const auto& [name, device] : devices) {
-    if (device.type == "mid360") frames += device.over(lidar).model.rate_hz;
-    if (device.type == "d430") frames += depth_frames(device.over(depth));
+    if (device.type == "mid360") frames += read_over(lidar, device.own).model.rate_hz;
+    if (device.type == "d430") frames += depth_frames(read_over(depth, device.own));
   }
   return frames;
 }
@@ -166,7 +164,7 @@ Pose start_pose(const worlds::World& world) {
 namespace {
 
 // What a pilot would read off the battery's label. A scenario may say otherwise.
-void tell_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
+void set_believed_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
   believed.full_v = battery.cells * battery.cell_full_v;
   believed.middle_v = battery.cells * battery.cell_middle_v;
   believed.empty_v = battery.cells * battery.cell_empty_v;
@@ -194,7 +192,7 @@ void derive(ScenarioConfig asked, const worlds::FileWorld* file_world, ScenarioC
     }
     config.stack.exploration.explorer.bounds = bounds;
   }
-  tell_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
+  set_believed_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
   set_mapped_box(asked.stack, config.stack.mapping.global);
   const GlobalMapConfig& map = asked.stack.mapping.global;
   config.scoring.low_m = std::max(config.scoring.low_m, map.low_m.z());
@@ -219,11 +217,9 @@ std::string broken_world_rule(const ScenarioConfig& config) {
   const Eigen::AlignedBox2d world = *known;
   const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
   if (about.contains(config.stack.exploration.explorer.bounds.extent())) return "";
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(),
-                "exploration.bounds within the world, which reaches from [%g, %g] to [%g, %g]",
-                world.min().x(), world.min().y(), world.max().x(), world.max().y());
-  return text.data();
+  return fmt::format(
+      "exploration.bounds within the world, which reaches from [{:g}, {:g}] to [{:g}, {:g}]",
+      world.min().x(), world.min().y(), world.max().x(), world.max().y());
 }
 
 /// The first rule that world, explored region, map and scores break together; empty: none.

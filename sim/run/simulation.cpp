@@ -1,13 +1,13 @@
 #include "run/simulation.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "run/device_types.h"
 #include "sensors/board_device.h"
-#include "sensors/depth_device.h"
-#include "sensors/lidar_device.h"
 #include "sensors/mocap_device.h"
 #include "stack/stack.h"
 
@@ -87,30 +87,18 @@ void Simulation::add_devices() {
         name.empty() ? config_.seed : RandomStream(config_.seed, "device " + name).bits();
     return DeviceContext{name, world_, scene_, airframe, X_BS, jobs_, outlets_, seed};
   };
-  const auto add = [&]<class T>(const std::string& name, std::unique_ptr<T> device) {
-    devices_.emplace_back(name, std::move(device));
+  const auto add = [&](const std::string& name, std::unique_ptr<Device> device) {
+    if (device) devices_.emplace_back(name, std::move(device));
   };
   add("imu", std::make_unique<BoardDevice>(config_.imu, autopilot_, context("", Pose())));
   if (config_.stack.uses_odometry("mocap")) {
     add("mocap", std::make_unique<MocapDevice>(config_.mocap, scorer_.X_WO(), context("", Pose())));
   }
-  const auto add_lidar = [&](const std::string& name, const LidarConfig& lidar,
-                             const DeviceContext& where) {
-    if (!lidar.enabled) return;
-    add(name, std::make_unique<LidarDevice>(lidar.model, lidar.latency_s, where));
-  };
-  const auto add_depth = [&](const std::string& name, const DepthConfig& depth,
-                             const DeviceContext& where) {
-    add(name, std::make_unique<DepthDevice>(depth.model, depth.latency_s, where));
-  };
-  add_lidar("lidar", config_.lidar, context("", airframe.X_BL));
-  add_depth("depth", config_.depth, context("", airframe.X_BC));
-  for (const auto& [name, device] : config_.devices) {
-    if (device.type == "mid360") {
-      add_lidar(name, device.over(config_.lidar), context(name, device.mount.X_BL()));
-    } else {
-      add_depth(name, device.over(config_.depth), context(name, device.mount.X_BC()));
-    }
+  add("lidar", make_mid360(config_.lidar, context("", airframe.X_BL)));
+  add("depth", make_d430(config_.depth, context("", airframe.X_BC)));
+  for (const auto& [name, section] : config_.devices) {
+    const DeviceContext where = context(name, section.mount.X_BL());
+    add(name, device_types().at(section.type, "devices").make(section.own, {config_, where}));
   }
 }
 
@@ -123,7 +111,7 @@ bool Simulation::tick() {
   run_autopilot();
   record();
   step_physics();
-  judge();
+  check_end();
   return outcome_ == Outcome::kFlying;
 }
 
@@ -230,15 +218,14 @@ void Simulation::note_cloud_growth() {
                      });
 }
 
-void Simulation::judge() {
+void Simulation::check_end() {
   if (const Contact* hit = physics_.collision()) {
     ++collisions_;
-    std::array<char, 96> detail{};
     const auto name = worlds::kSurfaceClassNames[static_cast<std::size_t>(hit->surface_class)];
-    std::snprintf(detail.data(), detail.size(), "%.*s %u at %.2f m/s",
-                  static_cast<int>(name.size()), name.data(), hit->object, hit->impact_speed_mps);
-    if (recorder_) recorder_->event({now_, EventKind::kCollision, detail.data()});
-    end(Outcome::kCollided, std::string("hit ") + detail.data());
+    const std::string what =
+        fmt::format("{} {} at {:.2f} m/s", name, hit->object, hit->impact_speed_mps);
+    if (recorder_) recorder_->event({now_, EventKind::kCollision, what});
+    end(Outcome::kCollided, "hit " + what);
   } else if (const FlightView view = stack_->view(); view.state == MissionState::kDone) {
     if (view.lost) {
       end(Outcome::kLost, "no odometry");
@@ -304,10 +291,10 @@ FlightResult Simulation::finish() {
   if (result.device_hashes.contains("depth")) result.renderer = Renderer::kName;
   for (const StageTimer* timer : {&timers_.devices, &timers_.stack, &timers_.autopilot,
                                   &timers_.physics, &timers_.recording}) {
-    result.timing.push_back(summarise(timer->name(), timer->seconds()));
+    result.timing.push_back(timing_row(timer->name(), timer->seconds()));
   }
   for (const auto& lane : jobs_.timings()) {
-    result.timing.push_back(summarise(lane.name, lane.seconds));
+    result.timing.push_back(timing_row(lane.name, lane.seconds));
   }
   return result;
 }

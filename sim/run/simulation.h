@@ -102,7 +102,7 @@ class Simulation {
   void run_autopilot();
   void step_physics();
   void record();
-  void judge();
+  void check_end();
   void end(Outcome outcome, const std::string& reason);
   void write_cloud();
   void note_cloud_growth();

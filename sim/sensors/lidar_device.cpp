@@ -10,15 +10,6 @@ namespace {
 
 constexpr Stamp kPart = 20 * kNanosecondsPerTick;  // a frame is cast in parts while it is fired
 
-// The housing's own beams do not meet it.
-std::vector<worlds::CollisionShape> airframe_without_lidar(const Airframe& airframe) {
-  std::vector<worlds::CollisionShape> shapes;
-  for (const auto& shape : airframe.shapes) {
-    if (shape.object != static_cast<std::uint32_t>(AirframePart::kLidar)) shapes.push_back(shape);
-  }
-  return shapes;
-}
-
 std::uint64_t hash_of(const LidarScan& scan) {
   Fingerprint hash;
   for (const LidarPoint& point : scan.points) {
@@ -65,11 +56,10 @@ struct LidarDevice::Frame {
   std::uint64_t hash = 0;
 };
 
-LidarDevice::LidarDevice(const Mid360Config& config, double latency_s, const DeviceContext& context)
+LidarDevice::LidarDevice(std::unique_ptr<const LidarModel> lidar, double latency_s,
+                         const DeviceContext& context)
     : name_(context.name),
-      lidar_(config, context.scene, context.X_BS, airframe_without_lidar(context.airframe),
-             context.seed),
-      period_(config.period()),
+      lidar_(std::move(lidar)),
       latency_(from_seconds(latency_s)),
       jobs_(context.jobs),
       lane_(jobs_.add_lane(name_.empty() ? "lidar" : name_, JobQueue::Order::kSideBySide)),
@@ -78,14 +68,15 @@ LidarDevice::LidarDevice(const Mid360Config& config, double latency_s, const Dev
 void LidarDevice::fire(const Moment& moment) {
   part_.push_back(moment.truth);
   const Stamp begin = part_.front().stamp;
-  const Stamp frame_begin = begin / period_ * period_;
-  const Stamp frame_end = frame_begin + period_;
+  const Stamp period = lidar_->period();
+  const Stamp frame_begin = begin / period * period;
+  const Stamp frame_end = frame_begin + period;
   if (moment.now < std::min(begin + kPart, frame_end)) return;
   const auto part = static_cast<std::size_t>((begin - frame_begin) / kPart);
-  if (part == 0) frame_ = std::make_shared<Frame>((period_ + kPart - 1) / kPart);
+  if (part == 0) frame_ = std::make_shared<Frame>((period + kPart - 1) / kPart);
   jobs_.schedule(lane_, frame_end + latency_,
                  [this, ticks = part_, frame = frame_, part]() -> JobQueue::Delivery {
-                   if (!frame->add(part, lidar_.scan(ticks))) return nullptr;
+                   if (!frame->add(part, lidar_->scan(ticks))) return nullptr;
                    return [this, frame] { deliver(*frame); };
                  });
   part_.assign(1, moment.truth);

@@ -5,16 +5,17 @@
 #include <vector>
 
 #include "sensors/device.h"
-#include "sensors/mid360.h"
+#include "sensors/lidar_model.h"
 
 namespace arex::sim {
 
-/// A MID-360 that fires at every tick. The parts of a frame are cast while the next ones are fired,
+/// A LiDAR that fires at every tick. The parts of a frame are cast while the next ones are fired,
 /// side by side; all become visible with the frame.
 class LidarDevice : public Device {
  public:
   /// @param latency_s after the frame's last firing
-  LidarDevice(const Mid360Config& config, double latency_s, const DeviceContext& context);
+  LidarDevice(std::unique_ptr<const LidarModel> lidar, double latency_s,
+              const DeviceContext& context);
 
   void fire(const Moment& moment) override;
 
@@ -23,8 +24,7 @@ class LidarDevice : public Device {
   void deliver(const Frame& frame);
 
   std::string name_;
-  Mid360 lidar_;
-  Stamp period_;
+  std::unique_ptr<const LidarModel> lidar_;
   Stamp latency_;
   JobQueue& jobs_;
   JobQueue::Lane lane_;

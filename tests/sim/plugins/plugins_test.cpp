@@ -153,8 +153,7 @@ TEST(Devices, WhatIsNoneIsRefusedInOneLine) {
     EXPECT_NE(result.err.find(said), std::string::npos) << result.err;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   };
-  expect("devices.rear={type: sonar}",
-         "device 'rear' has the type 'sonar', expected mid360 or d430");
+  expect("devices.rear={type: sonar}", "device 'rear': unknown type 'sonar'; did you mean");
   expect("devices.rear={type: mid360, rate: 5}", "unknown key 'rate'; did you mean");
   expect("devices.imu={type: mid360}", "devices with other names than imu");
   expect("devices.lidar=false", "'devices.lidar' is not set here any more; set lidar.enabled");

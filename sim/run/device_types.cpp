@@ -5,6 +5,7 @@
 #include "run/scenario.h"
 #include "sensors/depth_device.h"
 #include "sensors/lidar_device.h"
+#include "sensors/spinning_lidar.h"
 
 namespace arex::sim {
 namespace {
@@ -30,6 +31,15 @@ DeviceTypes make_types() {
                return make_d430(read_over(making.scenario.depth, section),
                                 looking_forward(making.context));
              }});
+  types.add<SpinningLidarConfig>(
+      "spinning", "lasers in a fan that turns, by default a VLP-16",
+      [](const SpinningLidarConfig& config, const DeviceMaking& making) {
+        const DeviceContext& context = making.context;
+        return std::make_unique<LidarDevice>(
+            std::make_unique<SpinningLidar>(config, context.scene, context.X_BS,
+                                            context.airframe.shapes, context.seed),
+            config.latency_s, context);
+      });
   return types;
 }
 

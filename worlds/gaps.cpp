@@ -45,7 +45,7 @@ void add_pillar(MeshBuilder& builder, const Vec2& p, double radius, double heigh
 
 }  // namespace
 
-World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
+World build(const GapsRecipe& recipe, std::uint64_t seed) {
   constexpr double kWallThickness = 0.2;
   MeshBuilder builder;
   RandomStream random(seed, "worlds/gaps");
@@ -94,7 +94,7 @@ World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
   return builder.finish();
 }
 
-World build_empty(const EmptyRecipe& recipe, std::uint64_t seed) {
+World build(const EmptyRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream random(seed, "worlds/empty");
   builder.add_height_field(

@@ -39,6 +39,23 @@ struct WorldConfig {
   }
 };
 
+/// Hands the chosen recipe to `use`: a further one is added here, and in WorldConfig. A recipe has
+/// build(recipe, seed), extent() and, if a vehicle cannot get everywhere in it, limit_reach().
+/// @pre not of kind file
+template <class Use>
+auto with_recipe(const WorldConfig& config, const Use& use) {
+  switch (config.kind) {
+    case WorldKind::kGarage:
+      return use(config.garage);
+    case WorldKind::kGaps:
+      return use(config.gaps);
+    case WorldKind::kEmpty:
+      return use(config.empty);
+    default:
+      return use(config.forest);
+  }
+}
+
 /// Builds the chosen world; a pure function of its arguments, and of the file for kind file.
 /// @throws ConfigError (without FILE:LINE) if a vehicle of this radius cannot reach most of the
 /// free space from the start; of a file's world, hardly anything.

@@ -72,7 +72,7 @@ void print(const char* name, const Row& row) {
 }  // namespace
 
 int main() {
-  const worlds::World forest = worlds::build_forest({}, 1);
+  const worlds::World forest = worlds::build({}, 1);
   const worlds::World nothing;
   PhysicsConfig windy;
   windy.wind.mean_mps = {2, 0, 0};

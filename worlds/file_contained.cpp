@@ -54,7 +54,7 @@ bool write_all(int fd, const char* data, std::size_t size) {
   return true;
 }
 
-void restrain(const ContainedLimits& limits) {
+void limit_resources(const ContainedLimits& limits) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ}) std::signal(signal, SIG_DFL);
   const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -72,7 +72,7 @@ void restrain(const ContainedLimits& limits) {
 
 [[noreturn]] void work(int fd, const std::function<std::string()>& job,
                        const ContainedLimits& limits) {
-  restrain(limits);
+  limit_resources(limits);
   char kind = kComplaint;
   std::string text;
   try {

@@ -71,7 +71,7 @@ class SdfReader {
     config.SetFindCallback(
         [this](const std::string& uri) { return resolver_.find(uri, file_).string(); });
     sdf::Root root;
-    judge(root.Load(file_.string(), config));
+    note_errors(root.Load(file_.string(), config));
     scene_.up = FileUp::kZ;
     if (root.WorldCount() > 0) {
       const sdf::World& world = *root.WorldByIndex(0);
@@ -89,13 +89,13 @@ class SdfReader {
       throw std::runtime_error(complaints_.empty() ? "holds neither a world nor a model"
                                                    : complaints_.front());
     }
-    say_what_is_missing();
+    note_missing();
     return std::move(scene_);
   }
 
  private:
   /// As in Gazebo, what cannot be found or understood is left out, and said.
-  void judge(const sdf::Errors& errors) {
+  void note_errors(const sdf::Errors& errors) {
     for (const sdf::Error& error : errors) {
       const std::string text = error.Message();
       const bool lookup =
@@ -103,7 +103,7 @@ class SdfReader {
       if (!lookup) {
         complaints_.push_back(text);
       } else if (text.find("model://ground_plane") != std::string::npos) {
-        stand_in_for_the_ground();
+        add_default_ground();
       } else if (text.find("model://sun") == std::string::npos) {
         missing_.insert(text);
       }
@@ -111,7 +111,7 @@ class SdfReader {
   }
 
   /// Gazebo brings this model along, and nearly every world names it.
-  void stand_in_for_the_ground() {
+  void add_default_ground() {
     const std::uint32_t group = add_group("ground_plane", "", "plane");
     add_plane({}, Vec3::UnitZ(), {100, 100}, group);
     scene_.notes.emplace_back(
@@ -326,7 +326,7 @@ class SdfReader {
     append_heightmap(file, vector_of(map.Size()), X_FH, add_group(name, "", "heightmap"), scene_);
   }
 
-  void say_what_is_missing() {
+  void note_missing() {
     if (!missing_.empty()) {
       scene_.notes.push_back(std::to_string(missing_.size()) + " files not found and left out (" +
                              shortened(*missing_.begin(), 100) + "); see world.file.model_paths");

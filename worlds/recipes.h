@@ -8,12 +8,13 @@
 #include "worlds/forest.h"
 #include "worlds/gaps.h"
 #include "worlds/garage.h"
+#include "worlds/orchard.h"
 
 namespace arex::worlds {
 
-enum class WorldKind { kForest, kGarage, kGaps, kEmpty, kFile };
-constexpr std::array<std::string_view, 5> enum_names(WorldKind) {
-  return {"forest", "garage", "gaps", "empty", "file"};
+enum class WorldKind { kForest, kGarage, kGaps, kEmpty, kOrchard, kFile };
+constexpr std::array<std::string_view, 6> enum_names(WorldKind) {
+  return {"forest", "garage", "gaps", "empty", "orchard", "file"};
 }
 
 /// The `world` section of a scenario: which recipe, and the recipes' parameters. Only the chosen
@@ -25,14 +26,16 @@ struct WorldConfig {
   GarageRecipe garage;
   GapsRecipe gaps;
   EmptyRecipe empty;
+  OrchardRecipe orchard;
   FileRecipe file;
 
   void fields(auto& f) {
-    f("kind", kind, "forest, garage, gaps, empty or file");
+    f("kind", kind, "forest, garage, gaps, empty, orchard or file");
     f("forest", forest, "recipe of kind forest");
     f("garage", garage, "recipe of kind garage");
     f("gaps", gaps, "recipe of kind gaps");
     f("empty", empty, "recipe of kind empty");
+    f("orchard", orchard, "recipe of kind orchard");
     f("file", file, "what somebody else has made, for kind file");
     f.check(kind != Kind::kFile || !file.path.empty(),
             "file.path, a mesh, Gazebo world, octree or cloud");
@@ -51,6 +54,8 @@ auto with_recipe(const WorldConfig& config, const Use& use) {
       return use(config.gaps);
     case WorldKind::kEmpty:
       return use(config.empty);
+    case WorldKind::kOrchard:
+      return use(config.orchard);
     default:
       return use(config.forest);
   }

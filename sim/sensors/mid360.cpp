@@ -101,7 +101,7 @@ Mid360::Mid360(const Mid360Config& config, const Scene& scene, const Pose& X_BL,
       scene_(scene),
       X_BL_(X_BL *
             Pose{so3::Exp(config.extrinsic_rotation_error_rad), config.extrinsic_position_error_m}),
-      pattern_(config.pattern),
+      pattern_(config.pattern, config.pattern_turn_deg),
       echo_(config.echo),
       body_(pick(airframe_B, false), X_BL_),
       rotors_(pick(airframe_B, true), X_BL_),

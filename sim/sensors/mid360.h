@@ -18,6 +18,7 @@ namespace arex::sim {
 struct Mid360Config {
   double rate_hz = 10;  ///< frames (datasheet); a whole number of ticks each
   PatternMode pattern = PatternMode::kDevice;
+  double pattern_turn_deg = Mid360Pattern::kUnitTurn_deg;  ///< of the device about its z
   bool noise_free = false;
   EchoConfig echo;
   double beam_half_angle_deg = 0.1;    ///< [E] half of 0.28 x 0.03 deg FWHM of the maker's siblings
@@ -41,6 +42,9 @@ struct Mid360Config {
   void fields(auto& f) {
     f("rate_hz", rate_hz, "frames (datasheet)");
     f("pattern", pattern, "device: a measured unit; table: the maker's table");
+    f("pattern_turn_deg", pattern_turn_deg,
+      "the device's pattern about the sensor's z; as measured its lines stack at 0 and 180 "
+      "degrees");
     f("noise_free", noise_free, "exact ranges and angles, every surface in range returns");
     f("echo", echo, "how a beam measures what it meets");
     f("beam_half_angle_deg", beam_half_angle_deg, "half-width of the beam [E]");
@@ -62,6 +66,7 @@ struct Mid360Config {
     f.check(rate_hz >= 1 && rate_hz <= 1000, "1 <= rate_hz <= 1000");
     f.check(!(rate_hz > 0) || period() % kNanosecondsPerTick == 0,
             "1 / rate_hz a whole number of milliseconds");
+    f.check(pattern_turn_deg >= -360 && pattern_turn_deg <= 360, "-360 <= pattern_turn_deg <= 360");
     f.check(beam_half_angle_deg >= 0 && beam_half_angle_deg < 5, "0 <= beam_half_angle_deg < 5");
     f.check(echo_separation_m >= 0, "echo_separation_m >= 0");
     f.check(merged_share >= 0 && merged_share <= 1, "0 <= merged_share <= 1");

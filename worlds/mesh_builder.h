@@ -18,7 +18,8 @@ class MeshBuilder {
   /// A fuller column is split at the median of its longest side until it is below this.
   static constexpr std::uint32_t kMaxChunkTriangles = 4000;
 
-  /// Registers a thing of the world; returns its id. @pre reflectivity in [0, 1].
+  /// Registers a thing of the world; returns its id. @pre 0 <= reflectivity <=
+  /// kGreatestReflectivity.
   std::uint32_t add_object(SurfaceClass surface_class, double reflectivity);
 
   // Surfaces: seen by the sensors, not felt.

@@ -39,7 +39,7 @@ inline constexpr std::array<std::string_view, 16> kSurfaceClassNames{
 /// World::objects.
 struct Object {
   SurfaceClass surface_class = SurfaceClass::kGround;
-  float reflectivity = 0.3F;  ///< diffuse, at 905 nm, 0..1
+  float reflectivity = 0.3F;  ///< at 905 nm: diffuse 0..1; above, see reflectivity.h
 };
 
 /// A contiguous range of triangles that lie close together: the unit of culling.

@@ -98,8 +98,7 @@ void Perception::add_scan(Stamp now, const LidarScanPtr& raw) {
       X_OL = pose_at(raw->stamp + point.offset_ns) * X_BL_;
     }
     points->push_back((X_OL * point.p_L.cast<double>()).cast<float>());
-    fractions->push_back(static_cast<float>(point.offset_ns) /
-                         static_cast<float>(raw->end - raw->stamp));
+    fractions->push_back(raw->fraction_of(point));
   }
   scan.points_O = points;
   scan.fractions = fractions;

@@ -36,10 +36,11 @@ StoppingModel stopping_of(const StackConfig& stack) {
 
 std::uint64_t hash_of(const LidarScan& scan) {
   TrajectoryHash hash;
+  hash.add(static_cast<std::uint64_t>(scan.stamp));
   for (const LidarPoint& point : scan.points) {
     hash.add_bytes(std::span<const float>(point.p_L.data(), 3));
     hash.add(std::uint64_t{point.offset_ns} << 32 | std::bit_cast<std::uint32_t>(point.intensity));
-    hash.add(std::uint64_t{point.line} << 8 | point.tag);
+    hash.add(std::uint64_t{point.firing} << 16 | std::uint64_t{point.line} << 8 | point.tag);
   }
   return hash.value();
 }
@@ -54,35 +55,30 @@ void add_to(TrajectoryHash& hash, const ImuSample& sample) {
   hash.add(static_cast<std::uint64_t>(sample.stamp));
   hash.add({sample.gyro_radps.data(), 3});
   hash.add({sample.accel_mps2.data(), 3});
+  hash.add({sample.field_gauss.data(), 3});
 }
 
 }  // namespace
 
 /// A frame of the LiDAR in the making: its parts are cast in any order, the last one joins them.
 struct Simulation::LidarFrame {
-  explicit LidarFrame(std::int64_t count)
-      : parts(static_cast<std::size_t>(count)),
-        missing(count),
-        scan(std::make_shared<LidarScan>()) {}
+  LidarFrame(const Mid360& device, Stamp from, Stamp to, std::int64_t count)
+      : lidar(device),
+        begin(from),
+        end(to),
+        parts(static_cast<std::size_t>(count)),
+        missing(count) {}
 
   void add(std::size_t part, LidarScan points) {
     parts[part] = std::move(points);
-    if (--missing == 0) join();
-  }
-
-  void join() {
-    scan->stamp = parts.front().stamp;
-    scan->end = parts.back().end;
-    for (LidarScan& part : parts) {
-      const auto offset = static_cast<std::uint32_t>(part.stamp - scan->stamp);
-      for (LidarPoint point : std::exchange(part.points, {})) {
-        point.offset_ns += offset;
-        scan->points.push_back(point);
-      }
-    }
+    if (--missing > 0) return;
+    scan = std::make_shared<LidarScan>(lidar.frame(begin, end, parts));
+    parts.clear();
     hash = hash_of(*scan);
   }
 
+  const Mid360& lidar;
+  Stamp begin, end;
   std::vector<LidarScan> parts;
   std::atomic<std::int64_t> missing;
   std::shared_ptr<LidarScan> scan;
@@ -193,25 +189,37 @@ void Simulation::fire_lidar() {
   // The parts of a frame are cast while the next ones are fired, side by side; all become visible
   // with the frame.
   const Stamp period = config_.lidar.period();
-  const Stamp begin = lidar_part_.front().stamp;
+  const Stamp begin = lidar_part_begin_;
   const Stamp frame_begin = begin / period * period;
   const Stamp frame_end = frame_begin + period;
   if (now_ < std::min(begin + kLidarPart, frame_end)) return;
-  const auto part = static_cast<std::size_t>((begin - frame_begin) / kLidarPart);
-  if (part == 0)
-    lidar_frame_ = std::make_shared<LidarFrame>((period + kLidarPart - 1) / kLidarPart);
+  const std::int64_t parts = (period + kLidarPart - 1) / kLidarPart;
+  const auto part = static_cast<std::int64_t>((begin - frame_begin) / kLidarPart);
+  if (part == 0) {
+    lidar_frame_ = std::make_shared<LidarFrame>(lidar_, frame_begin, frame_end, parts);
+  }
   jobs_.schedule(lidar_lane_, frame_end + from_seconds(config_.devices.lidar_latency_s),
-                 [this, ticks = lidar_part_, frame = lidar_frame_, part]() -> JobQueue::Delivery {
-                   frame->add(part, lidar_.scan(ticks));
-                   if (part + 1 < frame->parts.size()) return nullptr;
-                   return [this, frame] {
-                     sensor_hash_.add(frame->hash);
-                     lidar_hash_.add(frame->hash);
-                     stack_.add_scan(frame->scan);
-                     if (bag_) bag_->scan(*frame->scan);
-                   };
+                 [this, ticks = lidar_part_, frame = lidar_frame_, part, parts,
+                  from = LidarPackets::first_firing(frame_begin)]() -> JobQueue::Delivery {
+                   frame->add(static_cast<std::size_t>(part), lidar_.scan(ticks, from));
+                   if (part + 1 < parts) return nullptr;
+                   return [this, frame] { deliver(*frame); };
                  });
-  lidar_part_.assign(1, physics_.truth());
+  // The packet that is being filled when a frame ends belongs to the next: it begins within the
+  // last tick.
+  lidar_part_.clear();
+  if (now_ == frame_end) lidar_part_.push_back(previous_truth_);
+  lidar_part_.push_back(physics_.truth());
+  lidar_part_begin_ = now_;
+}
+
+void Simulation::deliver(const LidarFrame& frame) {
+  sensor_hash_.add(frame.hash);
+  lidar_hash_.add(frame.hash);
+  lidar_firings_ += frame.scan->firings();
+  lidar_misses_ += frame.scan->misses();
+  stack_.add_scan(frame.scan);
+  if (bag_) bag_->scan(*frame.scan);
 }
 
 void Simulation::fire_depth() {
@@ -380,6 +388,8 @@ FlightResult Simulation::finish() {
   result.trajectory_hash = trajectory_hash();
   result.sensor_hash = sensor_hash_.text();
   result.device_hashes = device_hashes();
+  result.lidar_firings = lidar_firings_;
+  result.lidar_misses = lidar_misses_;
   result.collisions = collisions_;
   result.targets = stack_.mission().targets();
   result.flight = scorer_.score(physics_.truth(), stack_);

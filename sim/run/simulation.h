@@ -56,6 +56,8 @@ struct FlightResult {
   std::string trajectory_hash;  ///< of the true state at every tick and every command
   std::string sensor_hash;      ///< of every scan and frame delivered
   DeviceHashes device_hashes;
+  std::int64_t lidar_firings = 0;  ///< of the scans delivered
+  std::int64_t lidar_misses = 0;   ///< of these without a return
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;
@@ -117,6 +119,7 @@ class Simulation {
   void score_coverage();
 
   struct LidarFrame;
+  void deliver(const LidarFrame& frame);
   struct Timers {
     StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
         recording{"recording"};
@@ -138,12 +141,14 @@ class Simulation {
   std::string reason_;
   MotorCommand motors_;
   Truth previous_truth_;
-  std::vector<Truth> lidar_part_;            ///< ticks of the part being fired
+  std::vector<Truth> lidar_part_;  ///< ticks of the part being fired; a frame's first has one more
+  Stamp lidar_part_begin_ = 0;
   std::shared_ptr<LidarFrame> lidar_frame_;  ///< the frame being fired
   std::int64_t depth_frame_ = 0;             ///< index of the next frame
 
   TrajectoryHash hash_;
   TrajectoryHash sensor_hash_, lidar_hash_, depth_hash_, imu_hash_;
+  std::int64_t lidar_firings_ = 0, lidar_misses_ = 0;
   FlightScorer scorer_;
   std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
   std::vector<Vec3> path_W_;                  ///< flown since the last score

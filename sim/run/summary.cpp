@@ -45,6 +45,10 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("sensor_hash", result.sensor_hash);
   figures.set("device_hashes.lidar", result.device_hashes.lidar);
   figures.set("device_hashes.imu", result.device_hashes.imu);
+  if (result.lidar_firings > 0) {
+    figures.set("lidar.firings", result.lidar_firings);
+    figures.set("lidar.misses", result.lidar_misses);
+  }
   figures.set("targets", targets_of(result));
   figures.set("collisions", result.collisions);
   figures.set("battery.used_wh", result.battery.used_wh);

@@ -12,6 +12,9 @@ struct MovedKey {
   std::string_view instead;
 };
 
+constexpr std::string_view kVibration =
+    "imu.vibration.level (none|smooth|typical|rough) and imu.vibration.scale";
+
 constexpr std::array kMovedKeys{
     MovedKey{"exploration.stop.return_home", "mission.land_at_start"},
     MovedKey{"exploration.stop.return_speed_mps",
@@ -28,6 +31,11 @@ constexpr std::array kMovedKeys{
              "caution.degenerate_speed_fraction, of planning.local.max_speed_mps"},
     MovedKey{"mapping.global.sensor", "mapping.sensor"},
     MovedKey{"vehicle.own_returns_m", "vehicle.own_returns_margin_m, beyond vehicle.radius_m"},
+    MovedKey{"imu.vibration.once_per_rev_mps2", kVibration},
+    MovedKey{"imu.vibration.blade_pass_mps2", kVibration},
+    MovedKey{"imu.vibration.broadband_mps2", kVibration},
+    MovedKey{"imu.vibration.gyro_radps", kVibration},
+    MovedKey{"depth.noise_kernel_px", "depth.noise_grid_px"},
     MovedKey{"world.vehicle_radius_m", "nothing: the radius is the model's (models/arex/arex.xml)"},
 };
 

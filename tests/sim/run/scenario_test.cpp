@@ -213,6 +213,8 @@ TEST(Scenario, AKeyThatHasMovedIsRefusedWithTheOneToSetInstead) {
       {"planning.local.true_radius_m=0.4", "vehicle.radius_m"},
       {"planning.replan.degenerate_speed_mps=1", "caution.degenerate_speed_fraction"},
       {"mapping.global.sensor.hit_probability=0.8", "mapping.sensor"},
+      {"imu.vibration.once_per_rev_mps2=4", "imu.vibration.level"},
+      {"depth.noise_kernel_px=5", "depth.noise_grid_px"},
       {"vehicle.own_returns_m=0.5", "vehicle.own_returns_margin_m"},
       {"world.vehicle_radius_m=0.4", "models/arex/arex.xml"}};
   for (const auto& [setting, instead] : moved) {

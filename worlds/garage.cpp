@@ -95,6 +95,21 @@ void add_pilasters(const Site& site) {
   }
 }
 
+/// A warning strip round a pillar at a driver's eyes.
+void add_warning_strip(const Site& site, const Vec2& at) {
+  constexpr double kLow = 1.2, kHigh = 1.3, kProud = 0.002;  // m
+  const double half = 0.5 * site.recipe.pillar_width_m + kProud;
+  const auto strip = site.add(SurfaceClass::kPillar, site.recipe.reflectivity.warning_strip);
+  const Vec3 up(0, 0, kHigh - kLow);
+  const Vec3 centre(at.x(), at.y(), site.recipe.floor_z_m + kLow);
+  const std::array<Vec3, 4> corners{centre + Vec3(half, half, 0), centre + Vec3(-half, half, 0),
+                                    centre + Vec3(-half, -half, 0), centre + Vec3(half, -half, 0)};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec3 &a = corners[i], &b = corners[(i + 1) % 4];
+    site.mesh.add_quad(strip, a, b, b + up, a + up);
+  }
+}
+
 /// A square pillar with a painted base and steel angles on its corners.
 void add_pillar(const Site& site, const Vec2& at) {
   constexpr double kGuardHeight = 1.1, kGuardLeg = 0.07, kGuardProud = 0.008;  // m
@@ -116,6 +131,7 @@ void add_pillar(const Site& site, const Vec2& at) {
       site.mesh.add_quad(guard, corner, along_y, along_y + up, corner + up);
     }
   }
+  add_warning_strip(site, at);
 }
 
 /// Main beams across the hall over every pillar column, lighter ones along it over every row.

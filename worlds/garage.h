@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "worlds/reflectivity.h"
 #include "worlds/world.h"
 
 /// An underground parking garage: a walled forecourt with the start pad, a ramp down along +x, and
@@ -12,10 +13,10 @@
 /// -10 m); what the paper leaves open follows common practice for garages and is named so.
 namespace arex::worlds {
 
-/// Diffuse reflectivities at the LiDAR's 905 nm. All are estimates from the order of published
-/// near-infrared spectra: bare concrete 0.3-0.4, asphalt 0.1-0.2, white traffic paint 0.6-0.8,
-/// coated sheet metal 0.4-0.5, rubber below 0.05; glass sends most of a beam on or away. Car paint
-/// spans black (carbon absorbs the near infrared as well) to white.
+/// Reflectivities at the LiDAR's 905 nm. The diffuse ones are all estimates from the order of
+/// published near-infrared spectra: bare concrete 0.3-0.4, asphalt 0.1-0.2, white traffic paint
+/// 0.6-0.8, coated sheet metal 0.4-0.5, rubber below 0.05; glass sends most of a beam on or away.
+/// Car paint spans black (carbon absorbs the near infrared as well) to white.
 struct GarageReflectivity {
   double concrete = 0.35;
   double asphalt = 0.15;
@@ -29,6 +30,9 @@ struct GarageReflectivity {
   double rubber = 0.04;
   double car_darkest = 0.05;
   double car_brightest = 0.75;
+  double number_plate = kNumberPlateReflectivity;
+  double sign = kSignReflectivity;
+  double warning_strip = kWarningStripReflectivity;
 
   void fields(auto& f) {
     f("concrete", concrete, "slabs, pillars, beams, outer walls (estimate)");
@@ -43,6 +47,13 @@ struct GarageReflectivity {
     f("rubber", rubber, "tyres (estimate)");
     f("car_darkest", car_darkest, "darkest car paint (estimate)");
     f("car_brightest", car_brightest, "brightest car paint (estimate)");
+    f("number_plate", number_plate, "of cars; above 1: times a perfect diffuse reflector");
+    f("sign", sign, "direction signs; above 1: times a perfect diffuse reflector");
+    f("warning_strip", warning_strip, "round pillars; above 1: times a perfect diffuse reflector");
+    const auto retro = [](double value) { return value > 0 && value <= kGreatestReflectivity; };
+    f.check(retro(number_plate), "0 < number_plate <= 1000");
+    f.check(retro(sign), "0 < sign <= 1000");
+    f.check(retro(warning_strip), "0 < warning_strip <= 1000");
     const auto valid = [](double value) { return value > 0 && value <= 1; };
     f.check(valid(concrete), "0 < concrete <= 1");
     f.check(valid(asphalt), "0 < asphalt <= 1");
@@ -107,7 +118,7 @@ struct GarageRecipe {
     f("door_width_m", door_width_m, "clear width of a room's doorway");
     f("door_height_m", door_height_m, "clear height of a room's doorway");
     f("service_runs", service_runs, "pipes, ducts and cable trays along the hall, at most");
-    f("reflectivity", reflectivity, "diffuse reflectivities at 905 nm");
+    f("reflectivity", reflectivity, "reflectivities at 905 nm");
     check_sizes(f);
   }
 

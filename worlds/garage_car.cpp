@@ -1,6 +1,7 @@
 #include "worlds/garage_car.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <numbers>
 #include <span>
@@ -186,6 +187,19 @@ void add_mirrors(MeshBuilder& mesh, const Profile& car, const Pose& X_WC, std::u
   }
 }
 
+/// Front and rear, on the ends of the shell.
+void add_plates(MeshBuilder& mesh, const Profile& car, const Pose& X_WC, std::uint32_t plates) {
+  constexpr double kHalfWidth = 0.26, kTall = 0.11, kProud = 0.008;  // m, the European format
+  for (const std::size_t end : {std::size_t{0}, car.stations.size() - 1}) {
+    const Station& s = car.stations[end];
+    const double x = s.x + std::copysign(kProud, s.x);
+    const double low = 0.5 * (s.low + s.belt) - 0.5 * kTall;
+    mesh.add_quad(plates, X_WC * Vec3(x, -kHalfWidth, low), X_WC * Vec3(x, kHalfWidth, low),
+                  X_WC * Vec3(x, kHalfWidth, low + kTall),
+                  X_WC * Vec3(x, -kHalfWidth, low + kTall));
+  }
+}
+
 /// Bonnet, middle, cabin and tail as one box each.
 void add_solids(MeshBuilder& mesh, const Profile& car, const Pose& X_WC, std::uint32_t body) {
   const auto& s = car.stations;
@@ -222,6 +236,7 @@ void add_car(MeshBuilder& mesh, CarKind kind, const Pose& X_WC, const CarMateria
   add_shell(mesh, car, X_WC, body, glass);
   add_wheels(mesh, car, X_WC, body, tyres);
   add_mirrors(mesh, car, X_WC, body);
+  add_plates(mesh, car, X_WC, mesh.add_object(SurfaceClass::kCar, materials.plate));
   add_solids(mesh, car, X_WC, body);
 }
 

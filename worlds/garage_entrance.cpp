@@ -217,7 +217,7 @@ void add_yard_furniture(const Site& site) {
     mesh.add_solid_box(post, {Mat3::Identity(), head}, {0.15, 0.6, 0.06});
   }
   const CarMaterials paint{0.5 * (shade.car_darkest + shade.car_brightest), shade.glass,
-                           shade.rubber};
+                           shade.rubber, shade.number_plate};
   add_car(mesh, CarKind::kVan, {so3::from_yaw(0), Vec3(14.0, 6.8, 0)}, paint);
   add_car(mesh, CarKind::kSedan, {so3::from_yaw(std::numbers::pi), Vec3(-3.0, -6.0, 0)}, paint);
 }

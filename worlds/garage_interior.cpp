@@ -191,7 +191,8 @@ void add_bays(const Site& site) {
     const Pose X_WC{so3::from_yaw(car.yaw_rad),
                     Vec3(car.centre.x(), car.centre.y(), site.recipe.floor_z_m)};
     add_car(site.mesh, car.kind, X_WC,
-            {car.reflectivity, site.recipe.reflectivity.glass, site.recipe.reflectivity.rubber});
+            {car.reflectivity, site.recipe.reflectivity.glass, site.recipe.reflectivity.rubber,
+             site.recipe.reflectivity.number_plate});
   }
 }
 

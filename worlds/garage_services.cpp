@@ -128,12 +128,13 @@ void add_signs(const Site& site) {
   const double top = soffit(site) - kGap;
   for (const Interval& block : site.plan.blocks) {
     for (const double y : site.plan.aisle_y) {
-      const auto sign = site.add(SurfaceClass::kPipe, site.recipe.reflectivity.marking);
+      const auto sign = site.add(SurfaceClass::kPipe, site.recipe.reflectivity.sign);
+      const auto rods = site.add(SurfaceClass::kPipe, site.recipe.reflectivity.metal);
       const double x = block.low - kBefore;
       add_small_box(site.mesh, sign,
                     {{x, y - kHalfWidth, top - kTall}, {x + kThick, y + kHalfWidth, top}});
       for (const double side : {-0.8, 0.8}) {
-        add_rod(site, sign, x + 0.5 * kThick, y + side * kHalfWidth, top);
+        add_rod(site, rods, x + 0.5 * kThick, y + side * kHalfWidth, top);
       }
     }
   }

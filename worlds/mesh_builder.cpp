@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "worlds/reflectivity.h"
+
 namespace arex::worlds {
 namespace {
 
@@ -79,7 +81,8 @@ std::vector<std::uint32_t> chunk_order(const World& world, std::vector<std::uint
 }  // namespace
 
 std::uint32_t MeshBuilder::add_object(SurfaceClass surface_class, double reflectivity, bool felt) {
-  require(reflectivity >= 0 && reflectivity <= 1, "a reflectivity lies in [0, 1]");
+  require(reflectivity >= 0 && reflectivity <= kGreatestReflectivity,
+          "a reflectivity lies in [0, 1], a retro-reflector's in (1, 1000]");
   world_.objects.push_back({surface_class, static_cast<float>(reflectivity), felt});
   return static_cast<std::uint32_t>(world_.objects.size() - 1);
 }

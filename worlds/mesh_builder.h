@@ -18,7 +18,8 @@ class MeshBuilder {
   /// A fuller column is split at the median of its longest side until it is below this.
   static constexpr std::uint32_t kMaxChunkTriangles = 4000;
 
-  /// Registers a thing of the world; returns its id. @pre reflectivity in [0, 1].
+  /// Registers a thing of the world; returns its id. @pre 0 <= reflectivity <=
+  /// kGreatestReflectivity.
   /// @param felt the vehicle touches its triangles
   std::uint32_t add_object(SurfaceClass surface_class, double reflectivity, bool felt = false);
 

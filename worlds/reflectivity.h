@@ -19,4 +19,13 @@ inline constexpr ReflectivityBand kDeadWoodReflectivity{0.25, 0.45};
 inline constexpr ReflectivityBand kForestFloorReflectivity{0.26, 0.36};  ///< litter on soil
 inline constexpr ReflectivityBand kConcreteReflectivity{0.30, 0.42};
 
+/// Above 1 a surface is a retro-reflector: the light that it sends back to where it came from, over
+/// what a perfect diffuse reflector would. That returns 1/pi cd/(lx m^2); the sheetings' least
+/// coefficients of retro-reflection at 0.2 degrees, white, are 50 (number plates, ISO 7591), 70
+/// (signs, ASTM D4956 type I) and 250 cd/(lx m^2) (warning strips, type III).
+inline constexpr double kNumberPlateReflectivity = 157;
+inline constexpr double kSignReflectivity = 220;
+inline constexpr double kWarningStripReflectivity = 785;
+inline constexpr double kGreatestReflectivity = 1000;
+
 }  // namespace arex::worlds

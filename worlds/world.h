@@ -40,7 +40,7 @@ constexpr const auto& enum_names(SurfaceClass) { return kSurfaceClassNames; }
 /// World::objects.
 struct Object {
   SurfaceClass surface_class = SurfaceClass::kGround;
-  float reflectivity = 0.3F;  ///< diffuse, at 905 nm, 0..1
+  float reflectivity = 0.3F;  ///< at 905 nm: diffuse 0..1; above, see reflectivity.h
   bool felt = false;  ///< the vehicle touches its triangles; otherwise its collision shapes, if any
 };
 

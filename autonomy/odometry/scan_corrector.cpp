@@ -10,11 +10,10 @@ namespace arex {
 namespace {
 
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
-  const double duration = static_cast<double>(scan.end - scan.stamp);
   std::vector<float> fractions;
   fractions.reserve(points.size());
   for (const ScanPoint& point : points) {
-    fractions.push_back(static_cast<float>(scan.points[point.index].offset_ns / duration));
+    fractions.push_back(scan.fraction_of(scan.points[point.index]));
   }
   return fractions;
 }

@@ -24,8 +24,7 @@ RegisteredScan place_scan(const LidarScan& raw, const PoseHistory& poses, const 
       X_OL = poses.at(raw.stamp + point.offset_ns) * X_BL;
     }
     points->push_back((X_OL * point.p_L.cast<double>()).cast<float>());
-    fractions->push_back(static_cast<float>(point.offset_ns) /
-                         static_cast<float>(raw.end - raw.stamp));
+    fractions->push_back(raw.fraction_of(point));
   }
   scan.points_O = points;
   scan.fractions = fractions;

@@ -6,11 +6,14 @@
 namespace arex {
 
 LidarWatch::Survey LidarWatch::survey(const LidarScan& scan) const {
+  // By their place among the firings: the times of packets overlap.
+  const bool counted = !scan.packets_ns.empty();
   const auto period = static_cast<std::uint32_t>(std::lround(config_.firing_period_s * 1e9));
-  const std::size_t firings = static_cast<std::size_t>(scan.end - scan.stamp) / period;
+  const std::size_t firings = counted ? static_cast<std::size_t>(scan.firings())
+                                      : static_cast<std::size_t>(scan.end - scan.stamp) / period;
   std::vector<float> range(firings, 0);
   for (const LidarPoint& point : scan.points) {
-    const std::size_t i = point.offset_ns / period;
+    const std::size_t i = counted ? point.firing : point.offset_ns / period;
     if (i < firings) range[i] = point.p_L.norm();
   }
   Survey out;

@@ -102,7 +102,10 @@ class Outputs {
   /// @throws DiskError if one of them cannot be begun.
   void begin(const RunArguments& arguments, const sim::Scenario& scenario,
              const std::filesystem::path& folder, sim::Simulation& simulation) {
-    if (!arguments.bag.empty()) bag_.emplace(arguments.bag, scenario.config.stack.vehicle);
+    if (!arguments.bag.empty()) {
+      bag_.emplace(arguments.bag, scenario.config.stack.vehicle, sim::BagCompression::kNone,
+                   scenario.config.lidar.misses_in_bag);
+    }
     recorder_.emplace(folder, scenario.resolved_yaml());
     simulation.record_to(*recorder_);
     if (bag_) simulation.record_to(*bag_);

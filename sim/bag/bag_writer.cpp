@@ -40,6 +40,21 @@ constexpr std::array<PointFieldRow, 7> kPointFields{{{"x", 0, FieldType::kFloat3
                                                      {"tag", 21, FieldType::kUint8}}};
 constexpr std::uint32_t kPointStep = 22;
 
+constexpr double kTeslaPerGauss = 1e-4;
+
+/// The scan with its firings that returned nothing: at the origin, as the driver writes them.
+std::vector<LidarPoint> every_firing(const LidarScan& scan) {
+  if (scan.packets_ns.empty()) return scan.points;
+  std::vector<LidarPoint> all(static_cast<std::size_t>(scan.firings()));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto firing = static_cast<std::int64_t>(i);
+    all[i].offset_ns = scan.firing_ns(firing);
+    all[i].line = static_cast<std::uint8_t>(firing % LidarScan::kLines);
+  }
+  for (const LidarPoint& point : scan.points) all[point.firing] = point;
+  return all;
+}
+
 void put_numbers(RosBytes& out, std::span<const double> values) {
   out.put_raw(values.data(), values.size_bytes());
 }
@@ -53,9 +68,11 @@ void put_covariance(RosBytes& out, double first = 0) {
 }  // namespace
 
 BagWriter::BagWriter(const std::filesystem::path& path, const VehicleConfig& vehicle,
-                     BagCompression compression)
+                     BagCompression compression, bool lidar_misses)
     : bag_(path, compression),
+      lidar_misses_(lidar_misses),
       imu_(topic("/imu/data", imu_type())),
+      field_(topic("/imu/mag", magnetic_field_type())),
       truth_(topic("/truth", odometry_type())),
       static_transforms_(topic("/tf_static", tf_type(), true)) {
   // Every bag has them, in this order.
@@ -94,12 +111,27 @@ void BagWriter::imu(const ImuSample& sample) {
   message_.put(sample.accel_mps2);
   put_covariance<9>(message_);
   bag_.write(imu_.connection, ros_time(sample.stamp), message_);
+  begin(field_, sample.stamp, kBodyFrame);
+  message_.put(kTeslaPerGauss * sample.field_gauss);
+  put_covariance<9>(message_);
+  bag_.write(field_.connection, ros_time(sample.stamp), message_);
+}
+
+void BagWriter::put_point(const LidarPoint& point) {
+  message_.put_raw(point.p_L.data(), 3 * sizeof(float));
+  message_.put(point.intensity);
+  message_.put(point.offset_ns);
+  message_.put(point.line);
+  message_.put(point.tag);
 }
 
 void BagWriter::scan(const LidarScan& scan) {
   Topic& topic = topic_of(scan.device, kScans, "/points", point_cloud_type());
   begin(topic, scan.stamp, lidar_frame(scan.device));
-  const auto count = static_cast<std::uint32_t>(scan.points.size());
+  const std::vector<LidarPoint> every =
+      lidar_misses_ ? every_firing(scan) : std::vector<LidarPoint>{};
+  const std::vector<LidarPoint>& points = lidar_misses_ ? every : scan.points;
+  const auto count = static_cast<std::uint32_t>(points.size());
   message_.put(std::uint32_t{1});  // height: an unordered cloud
   message_.put(count);
   message_.put_length(kPointFields.size());
@@ -112,15 +144,9 @@ void BagWriter::scan(const LidarScan& scan) {
   message_.put(false);  // is_bigendian
   message_.put(kPointStep);
   message_.put(kPointStep * count);
-  message_.put_length(kPointStep * scan.points.size());
-  message_.reserve(message_.size() + kPointStep * scan.points.size() + 1);
-  for (const LidarPoint& point : scan.points) {
-    message_.put_raw(point.p_L.data(), 3 * sizeof(float));
-    message_.put(point.intensity);
-    message_.put(point.offset_ns);
-    message_.put(point.line);
-    message_.put(point.tag);
-  }
+  message_.put_length(kPointStep * points.size());
+  message_.reserve(message_.size() + kPointStep * points.size() + 1);
+  for (const LidarPoint& point : points) put_point(point);
   message_.put(true);  // is_dense
   bag_.write(topic.connection, ros_time(scan.end), message_);
 }

@@ -14,6 +14,7 @@ namespace arex::sim {
 /// What the vehicle's sensors gave, as a ROS 1 bag on which others can run their own odometry.
 ///
 ///     /imu/data            sensor_msgs/Imu          base_link; no orientation (covariance -1)
+///     /imu/mag             sensor_msgs/MagneticField base_link, tesla; with every /imu/data
 ///     /livox/lidar         sensor_msgs/PointCloud2  livox_frame; one message per LiDAR frame
 ///     /truth               nav_msgs/Odometry        odom -> base_link, twist in base_link
 ///     /camera/depth        sensor_msgs/Image        camera_depth_optical_frame, 32FC1, metres
@@ -24,7 +25,10 @@ namespace arex::sim {
 /// odom is O, base_link is B (the IMU), livox_frame is L, camera_depth_optical_frame is C. A point
 /// takes 22 bytes without gaps: x y z intensity as float32 at 0 4 8 12, offset_time (since
 /// header.stamp, ns) as uint32 at 16, line and tag as uint8 at 20 and 21; x y z are in L at the
-/// point's own time. A depth that was not measured is NaN (REP 118).
+/// point's own time. Points stand in firing order, their times run backwards where the device's
+/// packets were stamped so. Firings without a return are left out, or, if asked for, have their
+/// line, their time and zeros, as the driver writes them. A depth that was not measured is NaN (REP
+/// 118).
 ///
 /// Further LiDARs and cameras have topics and frames of their names: /NAME/points in NAME_frame,
 /// /NAME/depth and /NAME/camera_info in NAME_optical_frame.
@@ -35,9 +39,11 @@ namespace arex::sim {
 class BagWriter {
  public:
   /// @param vehicle whose calibration goes to /tf_static
+  /// @param lidar_misses whether firings without a return are written, too
   BagWriter(const std::filesystem::path& path, const VehicleConfig& vehicle,
-            BagCompression compression = BagCompression::kNone);
+            BagCompression compression = BagCompression::kNone, bool lidar_misses = false);
 
+  /// To /imu/data and /imu/mag.
   void imu(const ImuSample& sample);
   void scan(const LidarScan& scan);
   /// @param X_OB, v_OB, w_OB_B pose, velocity in O (m/s) and angular rate in B (rad/s) of B in O
@@ -58,11 +64,14 @@ class BagWriter {
                   const RosMessageType& type);
   /// Starts message_ with a std_msgs/Header.
   void begin(Topic& topic, Stamp stamp, const std::string& frame);
+  void put_point(const LidarPoint& point);
   void camera_info(const DepthImage& image);
   void static_transforms(const VehicleConfig& vehicle);
 
   RosBag bag_;
+  bool lidar_misses_;
   Topic imu_;
+  Topic field_;
   Topic truth_;
   Topic static_transforms_;
   std::map<std::string, Topic> of_devices_;  ///< by the topic's name

@@ -58,6 +58,13 @@ RosMessageType imu_type() {
                      {kHeader, kQuaternion, kVector3})};
 }
 
+RosMessageType magnetic_field_type() {
+  return {"sensor_msgs/MagneticField", "2f3b0b43eed0c9501de0fa3ff89a45aa",
+          definition("Header header\ngeometry_msgs/Vector3 magnetic_field\n"
+                     "float64[9] magnetic_field_covariance\n",
+                     {kHeader, kVector3})};
+}
+
 RosMessageType point_cloud_type() {
   return {"sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181",
           definition("Header header\nuint32 height\nuint32 width\nPointField[] fields\n"

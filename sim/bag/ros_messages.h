@@ -15,6 +15,7 @@ struct RosMessageType {
 };
 
 RosMessageType imu_type();
+RosMessageType magnetic_field_type();
 RosMessageType point_cloud_type();
 RosMessageType odometry_type();
 RosMessageType image_type();

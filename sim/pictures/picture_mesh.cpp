@@ -53,6 +53,7 @@ Vec3 base_colour(const worlds::Object& object, RandomStream& random) {
     case SurfaceClass::kCar:
       if (reflectivity < 0.0475) return grey(0.012);            // rubber
       if (reflectivity < 0.0625) return {0.025, 0.035, 0.045};  // glass
+      if (reflectivity > 1) return grey(0.8);                   // number plate
       return car_paint(random);
     case SurfaceClass::kDoor:
       return {0.05, 0.16, 0.22};
@@ -60,6 +61,7 @@ Vec3 base_colour(const worlds::Object& object, RandomStream& random) {
       return hue < 0.35 ? Vec3(0.42, 0.05, 0.03) : grey(0.42);
     case SurfaceClass::kPillar:
     case SurfaceClass::kKerb:
+      if (reflectivity > 1) return grey(0.8);              // warning strip
       if (reflectivity > 0.55) return {0.75, 0.47, 0.02};  // safety paint
       return Vec3(1.0, 0.98, 0.94) * (0.95 * reflectivity);
     case SurfaceClass::kFloor:

@@ -12,6 +12,9 @@ struct MovedKey {
   std::string_view instead;
 };
 
+constexpr std::string_view kVibration =
+    "imu.vibration.level (none|smooth|typical|rough) and imu.vibration.scale";
+
 constexpr std::array kMovedKeys{
     MovedKey{"exploration.stop.return_home", "mission.land_at_start"},
     MovedKey{"exploration.stop.return_speed_mps",
@@ -35,6 +38,11 @@ constexpr std::array kMovedKeys{
     MovedKey{"devices.lidar", "lidar.enabled"},
     MovedKey{"devices.lidar_latency_s", "lidar.latency_s"},
     MovedKey{"devices.depth_latency_s", "depth.latency_s"},
+    MovedKey{"imu.vibration.once_per_rev_mps2", kVibration},
+    MovedKey{"imu.vibration.blade_pass_mps2", kVibration},
+    MovedKey{"imu.vibration.broadband_mps2", kVibration},
+    MovedKey{"imu.vibration.gyro_radps", kVibration},
+    MovedKey{"depth.noise_kernel_px", "depth.noise_grid_px"},
     MovedKey{"world.vehicle_radius_m", "nothing: the radius is the model's (models/arex/arex.xml)"},
 };
 

@@ -270,6 +270,11 @@ FlightResult Simulation::finish() {
   result.trajectory_hash = trajectory_hash();
   result.sensor_hash = outlets_.frames.text();
   result.device_hashes = device_hashes();
+  for (const auto& [name, device] : devices_) {
+    if (name != "lidar") continue;
+    result.lidar_firings = device->firings();
+    result.lidar_misses = device->misses();
+  }
   result.collisions = collisions_;
   const FlightView view = stack_->view();
   result.targets.assign(view.targets.begin(), view.targets.end());

@@ -52,6 +52,8 @@ struct FlightResult {
   std::string sensor_hash;      ///< of every scan and frame delivered
   /// What each device delivered: where two hosts differ, the first to differ tells.
   std::map<std::string, std::string> device_hashes;
+  std::int64_t lidar_firings = 0;  ///< of the first LiDAR's scans delivered
+  std::int64_t lidar_misses = 0;   ///< of these without a return
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;

@@ -44,6 +44,10 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("trajectory_hash", result.trajectory_hash);
   figures.set("sensor_hash", result.sensor_hash);
   for (const auto& [name, hash] : result.device_hashes) figures.set("device_hashes." + name, hash);
+  if (result.lidar_firings > 0) {
+    figures.set("lidar.firings", result.lidar_firings);
+    figures.set("lidar.misses", result.lidar_misses);
+  }
   figures.set("targets", targets_of(result));
   figures.set("collisions", result.collisions);
   figures.set("battery.used_wh", result.battery.used_wh);

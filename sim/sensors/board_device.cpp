@@ -38,6 +38,7 @@ void BoardDevice::add(const ImuSample& sample) {
   fingerprint_.add(static_cast<std::uint64_t>(sample.stamp));
   fingerprint_.add({sample.gyro_radps.data(), 3});
   fingerprint_.add({sample.accel_mps2.data(), 3});
+  fingerprint_.add({sample.field_gauss.data(), 3});
 }
 
 }  // namespace arex::sim

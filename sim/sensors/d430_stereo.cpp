@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "math/mix.h"
+#include "math/random.h"
 
 // Plain loops over rows that the compiler turns into vector code (CMakeLists.txt gives this file
 // -O3); no loop carries a float sum, so the vector width changes no bit.
@@ -27,10 +28,6 @@ void fill_with_random_bytes(std::uint64_t seed, void* out, std::size_t bytes) {
 
 std::size_t round_up_to_8(std::size_t n) { return (n + 7) / 8 * 8; }
 
-/// Mean and variance of a uniform signed byte.
-constexpr double kByteMean = -0.5;
-constexpr double kByteVariance = (256.0 * 256.0 - 1.0) / 12.0;
-
 /// A disparity step between b and c that neither side's slope (a to b, c to d) explains.
 inline bool is_step(float a, float b, float c, float d, float threshold) {
   const float from_left = std::abs(c - (2 * b - a));
@@ -43,24 +40,47 @@ inline float lesser(float a, float b) { return std::abs(a) < std::abs(b) ? a : b
 
 }  // namespace
 
-StereoModel::StereoModel(const D430Config& config)
+D430Config D430Config::as_built(std::uint64_t seed) const {
+  D430Config unit = *this;
+  RandomStream random(seed, "d430.unit");
+  const double focal = random.normal(), bias = random.normal();
+  if (!noise_free) {
+    unit.focal_px += focal_spread_px * focal;
+    unit.disparity_bias_px += disparity_bias_spread_px * bias;
+  }
+  unit.focal_spread_px = unit.disparity_bias_spread_px = 0;
+  return unit;
+}
+
+StereoModel::StereoModel(const D430Config& config, std::uint64_t unit_seed)
     : config_(config), width_(config.width_px), height_(config.height_px) {
   const std::size_t pixels = size(width_) * size(height_);
-  const int pad = config_.noise_kernel_px - 1;
   disparity_.resize(pixels);
   for (auto* mask : {&lost_, &edge_, &widened_, &near_edge_}) mask->resize(round_up_to_8(pixels));
-  white_.resize(round_up_to_8(size(width_ + pad) * size(height_ + pad)));
-  smooth_.resize(size(width_) * size(height_ + pad));
-  noise_.resize(pixels);
-  // The kernel's sum of squares, for the triangle 1, 2, .., m, .., 2, 1.
-  const int m = (config_.noise_kernel_px + 1) / 2;
-  int squares = m * m;
-  for (int k = 1; k < m; ++k) squares += 2 * k * k;
-  noise_rms_ = std::sqrt(kByteVariance) * squares;
+  grid_columns_ = size(width_ / config_.noise_grid_px + 3);
+  grid_rows_ = size(height_ / config_.noise_grid_px + 3);
+  for (int u = 0; u < width_; ++u) column_weights_.push_back(weights_at(u));
+  nodes_.resize(grid_columns_ * grid_rows_);
+  rows_.resize(size(width_) * grid_rows_);
+  RandomStream random(unit_seed, "d430.pattern");
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    unit_.push_back(static_cast<float>(config_.unit_sigma_px * random.normal()));
+  }
+}
+
+/// A quadratic B-spline between nodes noise_grid_px apart, scaled to keep the nodes' variance at
+/// every pixel.
+StereoModel::SplineWeights StereoModel::weights_at(int pixel) const {
+  const int grid = config_.noise_grid_px;
+  const double t = (pixel % grid + 0.5) / grid;
+  const double a = 0.5 * (1 - t) * (1 - t), b = 0.5 + t - t * t, c = 0.5 * t * t;
+  const double scale = 1 / std::sqrt(a * a + b * b + c * c);
+  return {size(pixel / grid), static_cast<float>(scale * a), static_cast<float>(scale * b),
+          static_cast<float>(scale * c)};
 }
 
 void StereoModel::measure(const std::vector<float>& inverse_depth, std::uint64_t frame_seed,
-                          std::vector<float>& depth_m) {
+                          std::uint64_t view_seed, std::vector<float>& depth_m) {
   depth_m.resize(disparity_.size());
   if (config_.noise_free) {
     measure_exactly(inverse_depth, depth_m);
@@ -74,7 +94,7 @@ void StereoModel::measure(const std::vector<float>& inverse_depth, std::uint64_t
   find_lost_at_edges(mix_bits(frame_seed + 1));
   find_occluded();
   find_oblique(inverse_depth);
-  draw_noise(mix_bits(frame_seed + 2));
+  draw_noise(frame_seed, view_seed);
   finish(depth_m);
 }
 
@@ -227,48 +247,50 @@ void StereoModel::find_oblique(const std::vector<float>& inverse_depth) {
   }
 }
 
-/// White bytes smoothed by a triangle along rows and columns, in integers: exact, and Gaussian to
-/// 0.1 in kurtosis, being a sum of noise_kernel_px^2 terms.
-void StereoModel::draw_noise(std::uint64_t seed) {
-  const int m = (config_.noise_kernel_px + 1) / 2;
-  const int pad = config_.noise_kernel_px - 1;
-  const int w = width_;
-  fill_with_random_bytes(seed, white_.data(), white_.size());
-  for (int v = 0; v < height_ + pad; ++v) {
-    const std::int8_t* in = &white_[size(v) * size(w + pad)];
-    std::int16_t* out = &smooth_[size(v) * size(w)];
-    for (int u = 0; u < w; ++u) out[u] = 0;
-    for (int k = 0; k <= pad; ++k) {
-      const auto weight = static_cast<std::int16_t>(m - std::abs(k - m + 1));
-      for (int u = 0; u < w; ++u) out[u] = static_cast<std::int16_t>(out[u] + weight * in[u + k]);
-    }
+/// Draws the fields at the nodes of the grid, sums them and spreads the sum along the rows.
+void StereoModel::draw_noise(std::uint64_t frame_seed, std::uint64_t view_seed) {
+  const double all = config_.disparity_sigma_px * config_.disparity_sigma_px;
+  const double frame = config_.temporal_sigma_px, unit = config_.unit_sigma_px;
+  const double view = std::sqrt(std::max(0.0, all - frame * frame - unit * unit));
+  RandomStream frame_random(frame_seed, "d430.frame"), view_random(view_seed, "d430.view");
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    nodes_[i] =
+        unit_[i] + static_cast<float>(frame * frame_random.normal() + view * view_random.normal());
   }
-  for (int v = 0; v < height_; ++v) {
-    std::int16_t* out = &noise_[size(v) * size(w)];
-    for (int u = 0; u < w; ++u) out[u] = 0;
-    for (int k = 0; k <= pad; ++k) {
-      const std::int16_t* in = &smooth_[size(v + k) * size(w)];
-      const auto weight = static_cast<std::int16_t>(m - std::abs(k - m + 1));
-      for (int u = 0; u < w; ++u) out[u] = static_cast<std::int16_t>(out[u] + weight * in[u]);
+  for (std::size_t row = 0; row < grid_rows_; ++row) {
+    const float* nodes = &nodes_[row * grid_columns_];
+    float* out = &rows_[row * size(width_)];
+    for (const SplineWeights& w : column_weights_) {
+      const float* at = nodes + w.first;
+      *out++ = w.a * at[0] + w.b * at[1] + w.c * at[2];
     }
   }
 }
 
 void StereoModel::finish(std::vector<float>& depth_m) const {
-  const int m = (config_.noise_kernel_px + 1) / 2;
-  const auto scale = static_cast<float>(config_.disparity_sigma_px / noise_rms_);
-  const auto mean = static_cast<float>(kByteMean * m * m * m * m);  // the kernel sums to m^2
+  const auto bias = static_cast<float>(config_.disparity_bias_px);
   const auto step = static_cast<float>(config_.disparity_step_px);
   const auto per_step = static_cast<float>(1 / config_.disparity_step_px);
   const auto focal_baseline = static_cast<float>(config_.focal_px * config_.baseline_m);
   const auto nearest = static_cast<float>(config_.min_range_m);
   const auto furthest = static_cast<float>(config_.max_range_m);
-  for (std::size_t i = 0; i < depth_m.size(); ++i) {
-    const float noisy = disparity_[i] + scale * (static_cast<float>(noise_[i]) - mean);
-    const float z = focal_baseline / (step * std::floor(noisy * per_step + 0.5F));
-    // Zero or negative disparities give infinite or negative depths: out of range as well.
-    const bool good = (z >= nearest) & (z <= furthest) & (lost_[i] == 0);
-    depth_m[i] = good ? z : 0.0F;
+  const int w = width_;
+  for (int v = 0; v < height_; ++v) {
+    const SplineWeights of = weights_at(v);
+    const float* above = &rows_[of.first * size(w)];
+    const float* middle = above + w;
+    const float* below = middle + w;
+    const float* disparity = &disparity_[size(v) * size(w)];
+    const std::uint8_t* lost = &lost_[size(v) * size(w)];
+    float* depth = &depth_m[size(v) * size(w)];
+    for (int u = 0; u < w; ++u) {
+      const float noise = of.a * above[u] + of.b * middle[u] + of.c * below[u];
+      const float noisy = disparity[u] + (bias + noise);
+      const float z = focal_baseline / (step * std::floor(noisy * per_step + 0.5F));
+      // Zero or negative disparities give infinite or negative depths: out of range as well.
+      const bool good = (z >= nearest) & (z <= furthest) & (lost[u] == 0);
+      depth[u] = good ? z : 0.0F;
+    }
   }
 }
 

@@ -14,16 +14,23 @@ struct D430Config {
   int rate_hz = 30;         ///< paper, II-A
   int width_px = 848;
   int height_px = 480;
-  double focal_px = 446.8;    ///< 87 deg across (datasheet)
-  double baseline_m = 0.050;  ///< datasheet
+  double focal_px = 422.6;       ///< mean of five D43x at this size; datasheet 87 +- 3 deg across
+  double focal_spread_px = 1.2;  ///< of units, 1 sigma: those five lie in 420.9-424.2
+  double baseline_m = 0.050;     ///< datasheet
   double min_range_m = 0.177;
   double max_range_m = 10.0;
   double draw_range_m = 12.0;        ///< further than max_range_m by what the noise may bring back
-  double disparity_sigma_px = 0.08;  ///< RMS subpixel error: 14 mm at 2 m, 57 mm at 4 m
-  int noise_kernel_px = 5;           ///< 3, 5 or 7: correlation 2.7, 4.1 or 5.6 px wide
-  double disparity_step_px = 1.0 / 32;  ///< the device's subpixel resolution
-  double edge_step_px = 0.5;            ///< a disparity step above this is a depth edge
-  int edge_loss_min_px = 1;             ///< on each side: 2 to 4 px in all
+  double disparity_sigma_px = 0.08;  ///< RMS subpixel error: 15 mm at 2 m, 61 mm at 4 m
+  double temporal_sigma_px = 0.02;   ///< of it, anew each frame: D435 at rest, 4 mm at 2 m
+  double unit_sigma_px = 0.04;       ///< of it, fixed in the unit [E]; the rest is the view's
+  double view_step_m = 0.05;         ///< [E] 7 px at 3 m: the camera's next view
+  double view_step_rad = 0.016;      ///< [E] 7 px
+  int noise_grid_px = 7;             ///< correlation 0.74 at 4 px, 0.31 at 8 px, as D43x
+  double disparity_bias_px = -0.16;  ///< a D435: +8, +22, +107 mm at 1, 2, 3 m
+  double disparity_bias_spread_px = 0.03;  ///< [E] of units, 1 sigma
+  double disparity_step_px = 1.0 / 32;     ///< the device's subpixel resolution
+  double edge_step_px = 0.5;               ///< a disparity step above this is a depth edge
+  int edge_loss_min_px = 1;                ///< on each side: 2 to 4 px in all
   int edge_loss_max_px = 2;
   double max_incidence_rad = 75.0 / 180.0 * std::numbers::pi;
 
@@ -32,13 +39,21 @@ struct D430Config {
     f("rate_hz", rate_hz, "frames per second (paper, II-A)");
     f("width_px", width_px, "image columns");
     f("height_px", height_px, "image rows");
-    f("focal_px", focal_px, "focal length (datasheet: 87 deg across 848 px)");
+    f("focal_px", focal_px, "focal length, mean of units (five D43x at 848 px)");
+    f("focal_spread_px", focal_spread_px, "of units, 1 sigma; each knows its own");
     f("baseline_m", baseline_m, "distance of the two imagers (datasheet)");
     f("min_range_m", min_range_m, "smallest depth delivered (datasheet)");
     f("max_range_m", max_range_m, "largest depth delivered");
     f("draw_range_m", draw_range_m, "surfaces up to here are drawn: noise may bring them in range");
     f("disparity_sigma_px", disparity_sigma_px, "RMS disparity error; depth error z^2 s/(f B)");
-    f("noise_kernel_px", noise_kernel_px, "odd support of the kernel that correlates the noise");
+    f("temporal_sigma_px", temporal_sigma_px, "part of it that is drawn anew each frame");
+    f("unit_sigma_px", unit_sigma_px,
+      "part of it that is fixed in the unit; the rest is the view's");
+    f("view_step_m", view_step_m, "a camera that moved by more has another view [E]");
+    f("view_step_rad", view_step_rad, "a camera that turned by more has another view [E]");
+    f("noise_grid_px", noise_grid_px, "spacing of the spline that correlates the noise");
+    f("disparity_bias_px", disparity_bias_px, "calibration error, mean of units: depths read long");
+    f("disparity_bias_spread_px", disparity_bias_spread_px, "of units, 1 sigma [E]");
     f("disparity_step_px", disparity_step_px, "disparity quantisation");
     f("edge_step_px", edge_step_px, "disparity step between neighbours that makes a depth edge");
     f("edge_loss_min_px", edge_loss_min_px, "pixels lost on each side of a depth edge, least");
@@ -55,8 +70,17 @@ struct D430Config {
     f.check(draw_range_m >= max_range_m && draw_range_m <= 2000,
             "max_range_m <= draw_range_m <= 2000");
     f.check(disparity_sigma_px >= 0, "disparity_sigma_px >= 0");
-    f.check(noise_kernel_px == 3 || noise_kernel_px == 5 || noise_kernel_px == 7,
-            "noise_kernel_px is 3, 5 or 7");
+    f.check(focal_spread_px >= 0 && 6 * focal_spread_px < focal_px,
+            "0 <= focal_spread_px < focal_px / 6");
+    f.check(temporal_sigma_px >= 0 && unit_sigma_px >= 0,
+            "temporal_sigma_px >= 0, unit_sigma_px >= 0");
+    f.check(temporal_sigma_px * temporal_sigma_px + unit_sigma_px * unit_sigma_px <=
+                disparity_sigma_px * disparity_sigma_px,
+            "temporal_sigma_px^2 + unit_sigma_px^2 <= disparity_sigma_px^2");
+    f.check(view_step_m > 0 && view_step_rad > 0, "view_step_m > 0, view_step_rad > 0");
+    f.check(noise_grid_px >= 2 && noise_grid_px <= 64, "2 <= noise_grid_px <= 64");
+    f.check(disparity_bias_px >= -10 && disparity_bias_px <= 10, "-10 <= disparity_bias_px <= 10");
+    f.check(disparity_bias_spread_px >= 0, "disparity_bias_spread_px >= 0");
     f.check(disparity_step_px >= 1e-4, "disparity_step_px >= 1e-4");
     f.check(edge_step_px > 0, "edge_step_px > 0");
     f.check(edge_loss_min_px >= 0, "edge_loss_min_px >= 0");
@@ -66,6 +90,10 @@ struct D430Config {
             "0 < max_incidence_rad <= pi/2");
   }
 
+  /// A unit as it left the factory: its own focal length and bias, drawn from their spreads, which
+  /// become zero. Without noise the nominal one.
+  [[nodiscard]] D430Config as_built(std::uint64_t seed) const;
+
   /// Intrinsics of the left imager, which the depth image belongs to.
   [[nodiscard]] PinholeCamera camera() const {
     return {width_px, height_px, focal_px, focal_px, (width_px - 1) / 2.0, (height_px - 1) / 2.0};
@@ -74,20 +102,23 @@ struct D430Config {
 
 /// What stereo matching makes of a scene: from exact depths to those the device delivers.
 ///
-/// In disparity d = f B / z (px): Gaussian noise correlated over a few pixels, then quantisation,
-/// so that sigma_z = z^2 s / (f B). Lost are: pixels whose match lies outside the right image (a
+/// In disparity d = f B / z (px): a bias and Gaussian noise that is correlated over the image, then
+/// quantisation, so that a depth is off by z^2 / (f B) times that. The noise is a sum of three
+/// fields: one belongs to the unit, one to the view (matching errs alike as long as the image is
+/// the same) and one to the frame. Lost are: pixels whose match lies outside the right image (a
 /// band of f B / z px on the left) or behind something nearer (the half-occluded strip left of
 /// every foreground object); 2 to 4 px at depth edges; surfaces seen too obliquely; depths out of
 /// range. Source: models/arex/README.md.
 class StereoModel {
  public:
-  explicit StereoModel(const D430Config& config);
+  /// @param config a unit as built: its focal length and bias are taken as they stand
+  StereoModel(const D430Config& config, std::uint64_t unit_seed);
 
   /// `inverse_depth`: width * height values 1/z (1/m), rows from the top, 0 for nothing. Writes
-  /// z-depths (m), 0 for no measurement. A pure function of its arguments: the noise is that of
-  /// `frame_seed` alone. The object only lends its memory.
+  /// z-depths (m), 0 for no measurement. A pure function of its arguments and the unit: the noise
+  /// is that of `frame_seed` and `view_seed` alone. The object only lends its memory.
   void measure(const std::vector<float>& inverse_depth, std::uint64_t frame_seed,
-               std::vector<float>& depth_m);
+               std::uint64_t view_seed, std::vector<float>& depth_m);
 
  private:
   void measure_exactly(const std::vector<float>& inverse_depth, std::vector<float>& depth_m) const;
@@ -95,7 +126,7 @@ class StereoModel {
   void find_lost_at_edges(std::uint64_t seed);
   void find_occluded();
   void find_oblique(const std::vector<float>& inverse_depth);
-  void draw_noise(std::uint64_t seed);
+  void draw_noise(std::uint64_t frame_seed, std::uint64_t view_seed);
   void finish(std::vector<float>& depth_m) const;
 
   D430Config config_;
@@ -105,10 +136,18 @@ class StereoModel {
   std::vector<std::uint8_t> edge_;       ///< 1: within the current distance of a depth edge
   std::vector<std::uint8_t> widened_;    ///< scratch of the dilation
   std::vector<std::uint8_t> near_edge_;  ///< how many of the distances 1..max reach this pixel
-  std::vector<std::int8_t> white_;       ///< uniform bytes, padded by the kernel's half width
-  std::vector<std::int16_t> smooth_;     ///< white_ smoothed along the rows
-  std::vector<std::int16_t> noise_;      ///< smoothed both ways; RMS is noise_rms_
-  double noise_rms_ = 1;
+
+  /// Of a pixel among the nodes of the noise's grid: the first of three, and their weights.
+  struct SplineWeights {
+    std::size_t first = 0;
+    float a = 0, b = 0, c = 0;
+  };
+  [[nodiscard]] SplineWeights weights_at(int pixel) const;
+  std::size_t grid_columns_, grid_rows_;
+  std::vector<SplineWeights> column_weights_;  ///< of each image column
+  std::vector<float> unit_;                    ///< at the nodes, px
+  std::vector<float> nodes_;                   ///< all three fields, px
+  std::vector<float> rows_;                    ///< nodes_ spread over the columns
 };
 
 }  // namespace arex::sim

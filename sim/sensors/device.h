@@ -54,6 +54,10 @@ class Device {
   [[nodiscard]] const Fingerprint& fingerprint() const { return fingerprint_; }
   /// Whether it delivered anything.
   [[nodiscard]] bool delivered() const { return delivered_; }
+  /// Measurements tried in what it delivered, and those of them that returned nothing; 0 of what
+  /// counts none.
+  [[nodiscard]] std::int64_t firings() const { return firings_; }
+  [[nodiscard]] std::int64_t misses() const { return misses_; }
 
  protected:
   void note(std::uint64_t hash) {
@@ -63,6 +67,7 @@ class Device {
 
   Fingerprint fingerprint_;
   bool delivered_ = false;
+  std::int64_t firings_ = 0, misses_ = 0;
 };
 
 }  // namespace arex::sim

@@ -51,15 +51,16 @@ ImuSample ImuModel::sample(const Truth& truth) {
     raw.gyro_radps = gyro_.measure(raw.gyro_radps + shake.gyro_radps);
     raw.accel_mps2 = accel_.measure(raw.accel_mps2 + shake.accel_mps2);
   }
+  sample_field(truth, raw.stamp);
+  sample_pressure(truth, raw.stamp);
+  raw.field_gauss = field_gauss_;
   const Vec3 gyro = gyro_filter_.filter(raw.gyro_radps);
   const Vec3 accel = accel_filter_.filter(raw.accel_mps2);
   output_.reset();
   if (due(truth.stamp, config_.output_rate_hz)) {
     // Without noise the delay of the filter would be the only error left.
-    output_ = config_.noise_free ? raw : ImuSample{raw.stamp, gyro, accel};
+    output_ = config_.noise_free ? raw : ImuSample{raw.stamp, gyro, accel, field_gauss_};
   }
-  sample_field(truth, raw.stamp);
-  sample_pressure(truth, raw.stamp);
   return raw;
 }
 
@@ -67,10 +68,12 @@ void ImuModel::sample_field(const Truth& truth, Stamp stamp) {
   magnetometer_.reset();
   if (!due(truth.stamp, config_.magnetometer_rate_hz)) return;
   magnetometer_ = {stamp, truth.X_WB.R.transpose() * config_.earth_field_gauss};
-  if (config_.noise_free) return;
-  const double sigma = config_.magnetometer_noise_density *
-                       std::sqrt(static_cast<double>(config_.magnetometer_rate_hz));
-  magnetometer_->field_gauss += hard_iron_gauss_ + sigma * magnetometer_stream_.normal3();
+  if (!config_.noise_free) {
+    const double sigma = config_.magnetometer_noise_density *
+                         std::sqrt(static_cast<double>(config_.magnetometer_rate_hz));
+    magnetometer_->field_gauss += hard_iron_gauss_ + sigma * magnetometer_stream_.normal3();
+  }
+  field_gauss_ = magnetometer_->field_gauss;
 }
 
 void ImuModel::sample_pressure(const Truth& truth, Stamp stamp) {

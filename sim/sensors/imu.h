@@ -15,12 +15,12 @@ namespace arex::sim {
 struct ImuConfig {
   bool noise_free = false;
   double gyro_noise_density = 1.0e-4;            ///< rad/s/sqrt(Hz), 2x ICM-42688-P datasheet
-  double gyro_walk_density = 2.0e-5;             ///< rad/s^2/sqrt(Hz) [E]
+  double gyro_walk_density = 2.0e-6;             ///< rad/s^2/sqrt(Hz), 2x a Pixhawk 6C at rest
   double gyro_bias_sigma_radps = 0.002;          ///< [E] 0.1 deg/s left after start-up calibration
   double gyro_scale_sigma_fraction = 0.002;      ///< [E] datasheet 0.5 % worst case
   double gyro_range_radps = 34.906585039886591;  ///< 2000 deg/s
   double accel_noise_density = 1.4e-3;           ///< m/s^2/sqrt(Hz), 2x ICM-42688-P datasheet
-  double accel_walk_density = 1.0e-3;            ///< m/s^3/sqrt(Hz) [E]
+  double accel_walk_density = 5.0e-5;            ///< m/s^3/sqrt(Hz), 2x a Pixhawk 6C at rest
   double accel_bias_sigma_mps2 = 0.03;        ///< [E] 3 mg left after calibration; datasheet 20 mg
   double accel_scale_sigma_fraction = 0.001;  ///< [E] datasheet 0.5 % worst case
   double accel_range_mps2 = 16 * kGravity;    ///< 16 g
@@ -28,7 +28,7 @@ struct ImuConfig {
   int output_rate_hz = 200;                   ///< paper, II-A
   double output_cutoff_hz = 90;               ///< [E] just below half the output rate
   VibrationConfig vibration;
-  int magnetometer_rate_hz = 50;                  ///< [E]
+  int magnetometer_rate_hz = 200;                 ///< paper, III-A: nine axes at 200 Hz
   Vec3 earth_field_gauss{-0.019, 0.375, -0.253};  ///< IGRF near Guangzhou, W as east-north-up
   double magnetometer_noise_density = 4.0e-4;     ///< gauss/sqrt(Hz)
   double magnetometer_bias_sigma_gauss = 0.005;   ///< [E] hard iron left after calibration
@@ -39,12 +39,14 @@ struct ImuConfig {
   void fields(auto& f) {
     f("noise_free", noise_free, "exact samples of all four sensors, no vibration");
     f("gyro_noise_density", gyro_noise_density, "rad/s/sqrt(Hz), 2x ICM-42688-P datasheet");
-    f("gyro_walk_density", gyro_walk_density, "bias walk, rad/s^2/sqrt(Hz) [E]");
+    f("gyro_walk_density", gyro_walk_density,
+      "bias walk, rad/s^2/sqrt(Hz), 2x a Pixhawk 6C at rest");
     f("gyro_bias_sigma_radps", gyro_bias_sigma_radps, "initial bias of each axis [E]");
     f("gyro_scale_sigma_fraction", gyro_scale_sigma_fraction, "scale error of each axis [E]");
     f("gyro_range_radps", gyro_range_radps, "clipped beyond: 2000 deg/s");
     f("accel_noise_density", accel_noise_density, "m/s^2/sqrt(Hz), 2x ICM-42688-P datasheet");
-    f("accel_walk_density", accel_walk_density, "bias walk, m/s^3/sqrt(Hz) [E]");
+    f("accel_walk_density", accel_walk_density,
+      "bias walk, m/s^3/sqrt(Hz), 2x a Pixhawk 6C at rest");
     f("accel_bias_sigma_mps2", accel_bias_sigma_mps2, "initial bias of each axis [E]");
     f("accel_scale_sigma_fraction", accel_scale_sigma_fraction, "scale error of each axis [E]");
     f("accel_range_mps2", accel_range_mps2, "clipped beyond: 16 g");
@@ -52,7 +54,7 @@ struct ImuConfig {
     f("output_rate_hz", output_rate_hz, "samples to the stack (paper, II-A)");
     f("output_cutoff_hz", output_cutoff_hz, "second-order low-pass before decimation [E]");
     f("vibration", vibration, "what the rotors shake into it");
-    f("magnetometer_rate_hz", magnetometer_rate_hz, "samples [E]");
+    f("magnetometer_rate_hz", magnetometer_rate_hz, "samples (paper, III-A)");
     f("earth_field_gauss", earth_field_gauss, "in W, taken as east-north-up: near Guangzhou");
     f("magnetometer_noise_density", magnetometer_noise_density, "gauss/sqrt(Hz)");
     f("magnetometer_bias_sigma_gauss", magnetometer_bias_sigma_gauss, "hard iron left [E]");
@@ -91,7 +93,8 @@ class ImuModel {
   ImuSample sample(const Truth& truth);
 
   // What else fell due at the newest tick.
-  /// Low-passed and decimated: vibration above half the output rate aliases.
+  /// Low-passed and decimated: vibration above half the output rate aliases. With the newest sample
+  /// of the magnetometer.
   [[nodiscard]] const std::optional<ImuSample>& output() const { return output_; }
   [[nodiscard]] const std::optional<MagnetometerSample>& magnetometer() const {
     return magnetometer_;
@@ -128,6 +131,7 @@ class ImuModel {
   LowPass gyro_filter_, accel_filter_;
   RandomStream magnetometer_stream_, barometer_stream_;
   Vec3 hard_iron_gauss_ = Vec3::Zero();
+  Vec3 field_gauss_ = Vec3::Zero();  ///< newest sample
   std::optional<ImuSample> output_;
   std::optional<MagnetometerSample> magnetometer_;
   std::optional<BarometerSample> barometer_;

@@ -7,17 +7,91 @@ namespace arex::sim {
 namespace {
 
 constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
-constexpr double kShareOfRotor = 0.5;
+constexpr double kPi = std::numbers::pi;
 // Seen from above, in MotorCommand's order.
 constexpr std::array<double, 4> kTurningSense{1, 1, -1, -1};
 
+// Below this nothing that stays in its place can shake much: 0.1 m/s^2/sqrt(Hz) is 3 mm there.
+constexpr double kWashFrom_hz = 3;
+struct Mode {
+  double frequency_hz, damping;
+};
+// Arms and landing gear, the stack of plates, the sensor's mount. Broad, since each stands for
+// several.
+constexpr std::array<Mode, AxisVibration::kModes> kModes{{{10, 0.5}, {45, 0.35}, {75, 0.2}}};
+
+// Fitted by non-negative least squares to the spectra (Welch, 200 Hz) of the recordings behind the
+// output filter of this model, its aliases included, with rotors about 114 Hz as this vehicle's.
+// RMS above 5 Hz and what the fits leave: models/arex/README.md.
+constexpr VibrationSpectrum kNone{};
+constexpr VibrationSpectrum kSmooth{{{0.062, {0.061, 0, 0.111}, 1.92, 1.06},
+                                     {0.019, {0.007, 0, 0.061}, 0.81, 2.76},
+                                     {0.052, {0, 0, 0.084}, 1.52, 0.2},
+                                     {0.0003, {0.0040, 0, 0.0008}, 0.022, 0.158},
+                                     {0.0003, {0.0087, 0, 0.0031}, 0.097, 0.01},
+                                     {0.0003, {0.0086, 0, 0.0008}, 0.053, 0.01}}};
+constexpr VibrationSpectrum kTypical{{{0.112, {0.052, 0.209, 0.047}, 2.24, 0.3},
+                                      {0.029, {0, 0.142, 0.175}, 0.60, 1.91},
+                                      {0.04, {0.110, 0, 0.325}, 3.16, 0.3},
+                                      {0.0024, {0.0066, 0, 0.0051}, 0.097, 0.129},
+                                      {0.001, {0.0136, 0, 0.0104}, 0.209, 0.02},
+                                      {0.001, {0.0134, 0, 0.0084}, 0.043, 0.02}}};
+constexpr VibrationSpectrum kRough{{{0.03, {0.062, 0.230, 0}, 1.08, 0.3},
+                                    {0.03, {0, 0.380, 0.302}, 0.30, 0.3},
+                                    {0.03, {0.042, 0, 0.465}, 4.35, 0.3},
+                                    {0.001, {0.0066, 0, 0.0210}, 0.295, 0.03},
+                                    {0.001, {0.0068, 0, 0.0142}, 0.219, 0.03},
+                                    {0.001, {0.0117, 0.0115, 0.0143}, 0.02, 0.03}}};
+
 }  // namespace
 
+const VibrationSpectrum& vibration_spectrum(VibrationLevel level) {
+  switch (level) {
+    case VibrationLevel::kSmooth:
+      return kSmooth;
+    case VibrationLevel::kTypical:
+      return kTypical;
+    case VibrationLevel::kRough:
+      return kRough;
+    case VibrationLevel::kNone:
+      break;
+  }
+  return kNone;
+}
+
 VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed)
-    : config_(config), stream_(seed, "imu.vibration") {
-  for (double& phase : phase_rad_) phase = stream_.uniform(0, 2 * std::numbers::pi);
+    : config_(config), spectrum_(vibration_spectrum(config.level)), stream_(seed, "imu.vibration") {
+  double squares = 0;
+  for (std::size_t i = 0; i < kRotors; ++i) {
+    angle_rad_[i] = stream_.uniform(0, 2 * kPi);
+    unbalance_[i] = stream_.uniform(0.6, 1.4);
+    squares += unbalance_[i] * unbalance_[i];
+    for (auto& phase : phase_[i]) {
+      const double angle = stream_.uniform(0, 2 * kPi);
+      phase = {std::cos(angle), std::sin(angle)};
+    }
+    // The force of an unbalance turns with the rotor: y a quarter turn behind or before x.
+    const auto [c, s] = phase_[i][0];
+    phase_[i][1] = {kTurningSense[i] * s, -kTurningSense[i] * c};
+  }
+  for (double& unbalance : unbalance_) unbalance /= std::sqrt(squares);
+
+  // White noise of variance 1 at 1 kHz has a one-sided density of sqrt(2 / 1000).
+  const double white = std::sqrt(0.5 / kTick_s) * config.scale;
+  shapers_[0] = wash_shaper();
+  for (std::size_t m = 0; m < kModes.size(); ++m) {
+    shapers_[m + 1] = mode_shaper(kModes[m].frequency_hz, kModes[m].damping);
+  }
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const auto row = static_cast<Eigen::Index>(axis);
+    shapers_[0].gain[row] = white * spectrum_[axis].wash;
+    for (std::size_t m = 0; m < kModes.size(); ++m) {
+      shapers_[m + 1].gain[row] = white * spectrum_[axis].modes[m];
+    }
+  }
+
   // q'' + 2 z w q' + w^2 q = alpha, alpha constant over the tick.
-  const double w = 2 * std::numbers::pi * config.frame_mode_hz, z = config.frame_mode_damping;
+  const double w = 2 * kPi * config.frame_mode_hz, z = config.frame_mode_damping;
   const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kTick_s);
   const double c = std::cos(wd * kTick_s), s = std::sin(wd * kTick_s);
   transition_ << decay * (c + z * w / wd * s), decay * s / wd, -decay * w * w / wd * s,
@@ -26,29 +100,92 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
   input_ = rest - transition_ * rest;
 }
 
+// Bilinear transforms, pre-warped to the frequency: s^2 / (s^2 + sqrt(2) s + 1) ...
+VibrationModel::Shaper VibrationModel::wash_shaper() {
+  const double k = std::tan(kPi * kWashFrom_hz * kTick_s);
+  const double norm = 1 / (1 + std::numbers::sqrt2 * k + k * k);
+  Shaper shaper;
+  shaper.b0 = shaper.b2 = norm;
+  shaper.b1 = -2 * norm;
+  shaper.a1 = 2 * (k * k - 1) * norm;
+  shaper.a2 = (1 - std::numbers::sqrt2 * k + k * k) * norm;
+  return shaper;
+}
+
+// ... and 2 z s / (s^2 + 2 z s + 1), which is 1 at its middle.
+VibrationModel::Shaper VibrationModel::mode_shaper(double frequency_hz, double damping) {
+  const double k = std::tan(kPi * frequency_hz * kTick_s);
+  const double norm = 1 / (1 + 2 * damping * k + k * k);
+  Shaper shaper;
+  shaper.b0 = 2 * damping * k * norm;
+  shaper.b2 = -shaper.b0;
+  shaper.a1 = 2 * (k * k - 1) * norm;
+  shaper.a2 = (1 - 2 * damping * k + k * k) * norm;
+  return shaper;
+}
+
+VibrationModel::Six VibrationModel::Shaper::filter(const Six& white) {
+  const Six x = gain.cwiseProduct(white);
+  const Six y = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2;
+  x2 = x1;
+  x1 = x;
+  y2 = y1;
+  y1 = y;
+  return y;
+}
+
 VibrationModel::Shake VibrationModel::step(const std::array<double, 4>& rotor_radps,
                                            const Vec3& alpha_B) {
   Shake shake;
-  Vec3 shake_alpha = Vec3::Zero();
-  double mean_growth = 0;
-  for (std::size_t i = 0; i < rotor_radps.size(); ++i) {
-    const double speed = rotor_radps[i];
-    phase_rad_[i] = std::fmod(phase_rad_[i] + speed * kTick_s, 2 * std::numbers::pi);
+  double thrust = 0;  // over that at the reference speed
+  for (const double speed : rotor_radps) {
     const double ratio = speed / config_.reference_speed_radps;
-    const double growth = kShareOfRotor * ratio * ratio;
-    mean_growth += ratio * ratio / static_cast<double>(rotor_radps.size());
-    const double c = std::cos(phase_rad_[i]), s = kTurningSense[i] * std::sin(phase_rad_[i]);
-    shake.accel_mps2 += growth * Vec3(config_.once_per_rev_mps2 * c, config_.once_per_rev_mps2 * s,
-                                      config_.blade_pass_mps2 * std::cos(2 * phase_rad_[i]));
-    // The moment of the unbalance about the IMU: a quarter turn behind the force.
-    shake.gyro_radps += growth * config_.gyro_radps * Vec3(s, -c, 0);
-    shake_alpha +=
-        growth * config_.gyro_radps * speed * Vec3(kTurningSense[i] * c, kTurningSense[i] * s, 0);
+    thrust += ratio * ratio / static_cast<double>(kRotors);
   }
-  shake.accel_mps2 += mean_growth * config_.broadband_mps2 * stream_.normal3();
-  rock(alpha_B + shake_alpha);
+  Vec3 gyro_rate = Vec3::Zero();
+  if (thrust > 0 && config_.level != VibrationLevel::kNone) {
+    const Lines line = lines(rotor_radps);
+    const Six value = thrust * broadband() + line.value;
+    shake.accel_mps2 = value.head<3>();
+    shake.gyro_radps = value.tail<3>();
+    gyro_rate = line.gyro_rate;
+  }
+  rock(alpha_B + gyro_rate);
   shake.gyro_radps += config_.frame_coupling * mount_rate_;
   return shake;
+}
+
+VibrationModel::Six VibrationModel::broadband() {
+  Six sum = Six::Zero();
+  for (Shaper& shaper : shapers_) {
+    Six white;
+    for (double& value : white) value = stream_.normal();
+    sum += shaper.filter(white);
+  }
+  return sum;
+}
+
+VibrationModel::Lines VibrationModel::lines(const std::array<double, kRotors>& rotor_radps) {
+  Lines lines;
+  for (std::size_t i = 0; i < kRotors; ++i) {
+    const double speed = rotor_radps[i], ratio = speed / config_.reference_speed_radps;
+    angle_rad_[i] = std::fmod(angle_rad_[i] + speed * kTick_s, 2 * kPi);
+    const double growth = config_.scale * unbalance_[i] * ratio * ratio;
+    const double turned_c = std::cos(angle_rad_[i]), turned_s = std::sin(angle_rad_[i]);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const AxisVibration& of = spectrum_[axis];
+      const auto [phase_c, phase_s] = phase_[i][axis];
+      const double c = turned_c * phase_c - turned_s * phase_s;
+      const double s = turned_s * phase_c + turned_c * phase_s;
+      lines.value[static_cast<Eigen::Index>(axis)] +=
+          growth * (of.once_per_rev * c + of.twice_per_rev * (c * c - s * s));
+      if (axis >= 3) {
+        lines.gyro_rate[static_cast<Eigen::Index>(axis - 3)] -=
+            growth * of.once_per_rev * speed * s;
+      }
+    }
+  }
+  return lines;
 }
 
 void VibrationModel::rock(const Vec3& alpha_B) {

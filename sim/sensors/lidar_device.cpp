@@ -12,10 +12,11 @@ constexpr Stamp kPart = 20 * kNanosecondsPerTick;  // a frame is cast in parts w
 
 std::uint64_t hash_of(const LidarScan& scan) {
   Fingerprint hash;
+  hash.add(static_cast<std::uint64_t>(scan.stamp));
   for (const LidarPoint& point : scan.points) {
     hash.add_bytes(std::span<const float>(point.p_L.data(), 3));
     hash.add(std::uint64_t{point.offset_ns} << 32 | std::bit_cast<std::uint32_t>(point.intensity));
-    hash.add(std::uint64_t{point.line} << 8 | point.tag);
+    hash.add(std::uint64_t{point.firing} << 16 | std::uint64_t{point.line} << 8 | point.tag);
   }
   return hash.value();
 }
@@ -24,32 +25,25 @@ std::uint64_t hash_of(const LidarScan& scan) {
 
 /// A frame in the making: its parts are cast in any order, the last one joins them.
 struct LidarDevice::Frame {
-  explicit Frame(std::int64_t count)
-      : parts(static_cast<std::size_t>(count)),
-        missing(count),
-        scan(std::make_shared<LidarScan>()) {}
+  Frame(const LidarModel& model, Stamp from, Stamp to, std::int64_t count)
+      : lidar(model),
+        begin(from),
+        end(to),
+        parts(static_cast<std::size_t>(count)),
+        missing(count) {}
 
   /// @return whether it is whole now
   bool add(std::size_t part, LidarScan points) {
     parts[part] = std::move(points);
     if (--missing > 0) return false;
-    join();
+    scan = std::make_shared<LidarScan>(lidar.frame(begin, end, parts));
+    parts.clear();
+    hash = hash_of(*scan);
     return true;
   }
 
-  void join() {
-    scan->stamp = parts.front().stamp;
-    scan->end = parts.back().end;
-    for (LidarScan& part : parts) {
-      const auto offset = static_cast<std::uint32_t>(part.stamp - scan->stamp);
-      for (LidarPoint point : std::exchange(part.points, {})) {
-        point.offset_ns += offset;
-        scan->points.push_back(point);
-      }
-    }
-    hash = hash_of(*scan);
-  }
-
+  const LidarModel& lidar;
+  Stamp begin, end;
   std::vector<LidarScan> parts;
   std::atomic<std::int64_t> missing;
   std::shared_ptr<LidarScan> scan;
@@ -67,24 +61,33 @@ LidarDevice::LidarDevice(std::unique_ptr<const LidarModel> lidar, double latency
 
 void LidarDevice::fire(const Moment& moment) {
   part_.push_back(moment.truth);
-  const Stamp begin = part_.front().stamp;
   const Stamp period = lidar_->period();
-  const Stamp frame_begin = begin / period * period;
+  const Stamp frame_begin = part_begin_ / period * period;
   const Stamp frame_end = frame_begin + period;
-  if (moment.now < std::min(begin + kPart, frame_end)) return;
-  const auto part = static_cast<std::size_t>((begin - frame_begin) / kPart);
-  if (part == 0) frame_ = std::make_shared<Frame>((period + kPart - 1) / kPart);
-  jobs_.schedule(lane_, frame_end + latency_,
-                 [this, ticks = part_, frame = frame_, part]() -> JobQueue::Delivery {
-                   if (!frame->add(part, lidar_->scan(ticks))) return nullptr;
-                   return [this, frame] { deliver(*frame); };
-                 });
-  part_.assign(1, moment.truth);
+  if (moment.now < std::min(part_begin_ + kPart, frame_end)) return;
+  const auto part = static_cast<std::size_t>((part_begin_ - frame_begin) / kPart);
+  if (part == 0) {
+    frame_ =
+        std::make_shared<Frame>(*lidar_, frame_begin, frame_end, (period + kPart - 1) / kPart);
+  }
+  jobs_.schedule(
+      lane_, frame_end + latency_,
+      [this, ticks = part_, frame = frame_, part, frame_begin]() -> JobQueue::Delivery {
+        if (!frame->add(part, lidar_->scan(ticks, frame_begin))) return nullptr;
+        return [this, frame] { deliver(*frame); };
+      });
+  // What is fired within a frame's last tick may belong to the next.
+  part_.clear();
+  if (moment.now == frame_end) part_.push_back(moment.before);
+  part_.push_back(moment.truth);
+  part_begin_ = moment.now;
 }
 
 void LidarDevice::deliver(const Frame& frame) {
   frame.scan->device = name_;
   note(frame.hash);
+  firings_ += frame.scan->firings();
+  misses_ += frame.scan->misses();
   outlets_.frames.add(frame.hash);
   outlets_.software->add_scan(frame.scan);
   if (outlets_.bag) outlets_.bag->scan(*frame.scan);

@@ -29,7 +29,8 @@ class LidarDevice : public Device {
   JobQueue& jobs_;
   JobQueue::Lane lane_;
   Outlets& outlets_;
-  std::vector<Truth> part_;       ///< ticks of the part being fired
+  std::vector<Truth> part_;  ///< ticks of the part being fired; a frame's first has one more
+  Stamp part_begin_ = 0;
   std::shared_ptr<Frame> frame_;  ///< being fired
 };
 

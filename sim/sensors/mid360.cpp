@@ -1,5 +1,6 @@
 #include "sensors/mid360.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -17,6 +18,11 @@ constexpr std::size_t kPacket = 8;
 
 // A false alarm is faint [E].
 constexpr int kFalseAlarmIntensity = 10;
+
+// A return is weak if its light is less than this multiple of the least that is detected [E].
+constexpr float kModerateMargin = 2, kLowMargin = 1.3F;
+// A merged echo that lies further than this share of their distance from both surfaces [E].
+constexpr float kLowMergedShare = 0.2F;
 
 constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -85,6 +91,7 @@ struct Mid360::Tick {
   std::array<Ray, kBeams> rays;
   std::array<RayHit, kBeams> hits;
   std::array<float, kBeams> cos_incidence;
+  std::array<std::uint8_t, kBeams> merged;  ///< the tag's confidence
   // Beams that the airframe stops; they are not cast into the world.
   struct Stopped {
     std::size_t beam = 0;
@@ -101,15 +108,17 @@ Mid360::Mid360(const Mid360Config& config, const Scene& scene, const Pose& X_BL,
       scene_(scene),
       X_BL_(X_BL *
             Pose{so3::Exp(config.extrinsic_rotation_error_rad), config.extrinsic_position_error_m}),
-      pattern_(config.pattern),
+      pattern_(config.pattern, config.pattern_turn_deg),
       echo_(config.echo),
+      packets_(config.noise_free ? 0 : config.packet_jitter_s, seed),
       body_(pick(airframe_B, false), X_BL_),
       rotors_(pick(airframe_B, true), X_BL_),
       stream_(seed, "mid360"),
       beam_stream_(seed, "mid360.beam"),
       rotor_stream_(seed, "mid360.rotor") {}
 
-LidarScan Mid360::scan(std::span<const Truth> ticks) const {
+LidarScan Mid360::scan(std::span<const Truth> ticks, Stamp frame_begin) const {
+  const std::int64_t from_firing = LidarPackets::first_firing(frame_begin);
   if (ticks.size() < 2) throw std::invalid_argument("a LiDAR frame needs at least two ticks");
   if (ticks.back().stamp - ticks.front().stamp > std::numeric_limits<std::uint32_t>::max()) {
     throw std::invalid_argument("a LiDAR frame of more than 4.29 s has no point offsets");
@@ -122,6 +131,10 @@ LidarScan Mid360::scan(std::span<const Truth> ticks) const {
   for (std::size_t i = 0; i + 1 < ticks.size(); ++i) {
     if (within(ticks[i].stamp, config_.fault_silent_from_s, config_.fault_silent_for_s)) continue;
     aim(ticks[i], ticks[i + 1], tick);
+    const auto left_out = std::clamp<std::int64_t>(from_firing - tick.first_firing, 0, kBeams);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(left_out); ++k) {
+      tick.rays[k].max_distance_m = -1;
+    }
     meet_airframe(tick);
     scene_.cast(tick.rays, tick.hits);
     for (std::size_t k = 0; k < kBeams; ++k) {
@@ -132,8 +145,16 @@ LidarScan Mid360::scan(std::span<const Truth> ticks) const {
       const Tick::Stopped& stopped = tick.stopped[k];
       tick.hits[stopped.beam] = stopped.hit;
       tick.cos_incidence[stopped.beam] = stopped.cos_incidence;
+      tick.merged[stopped.beam] = 0;
     }
     receive(tick, scan.stamp, scan.points);
+  }
+  if (from_firing > 0) {
+    const auto earlier = [&](const LidarPoint& point) {
+      return (scan.stamp + point.offset_ns) / Mid360Pattern::kFiringPeriod < from_firing;
+    };
+    scan.points.erase(scan.points.begin(),
+                      std::find_if_not(scan.points.begin(), scan.points.end(), earlier));
   }
   return scan;
 }
@@ -155,6 +176,7 @@ void Mid360::aim(const Truth& from, const Truth& to, Tick& tick) const {
   tick.stamp = from.stamp;
   tick.first_firing = from.stamp / Mid360Pattern::kFiringPeriod;
   tick.stopped_count = 0;
+  tick.merged.fill(0);
   std::array<Mid360Pattern::Shot, kShots> shots;
   pattern_.directions(tick.first_firing / kLines, shots);
 
@@ -249,7 +271,10 @@ void Mid360::split_beams(Tick& tick) const {
     const float other_light =
         shares[j] * other.reflectivity * std::abs(other.normal_W.dot(rays[j].direction_W));
     const float sum = std::max(light + other_light, 1e-9F);
-    hit.distance_m += other_light / sum * (other.distance_m - hit.distance_m);
+    const float share = other_light / sum;
+    hit.distance_m += share * (other.distance_m - hit.distance_m);
+    tick.merged[beams[j]] =
+        std::min(share, 1 - share) > kLowMergedShare ? LidarTag::kLow : LidarTag::kModerate;
   }
 }
 
@@ -286,6 +311,7 @@ void Mid360::receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>
     if ((luck & 0xFFFFFFFF) < false_below) {
       point.p_L = static_cast<float>(stream.uniform(echo.blind_m, echo.max_range_m)) * d;
       point.intensity = static_cast<float>(stream.uniform_int(0, kFalseAlarmIntensity));
+      point.tag = LidarTag::kLow << LidarTag::kWeakShift;
       points.push_back(point);
       continue;
     }
@@ -297,8 +323,19 @@ void Mid360::receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>
     point.p_L =
         (r + echo_.fast_range_sigma(r, cosine) * along) * d + r * angle_sigma * (noise - along * d);
     point.intensity = EchoModel::intensity(hit.reflectivity, cosine);
+    point.tag = tag_of(tick, i);
     points.push_back(point);
   }
+}
+
+std::uint8_t Mid360::tag_of(const Tick& tick, std::size_t beam) const {
+  const RayHit& hit = tick.hits[beam];
+  const float margin = echo_.margin(hit.distance_m, hit.reflectivity, tick.cos_incidence[beam]);
+  const int weak = margin < kLowMargin        ? LidarTag::kLow
+                   : margin < kModerateMargin ? LidarTag::kModerate
+                                              : 0;
+  return static_cast<std::uint8_t>(tick.merged[beam] << LidarTag::kMergedShift |
+                                   weak << LidarTag::kWeakShift);
 }
 
 }  // namespace arex::sim

@@ -11,15 +11,19 @@
 #include "sensors/lidar_model.h"
 #include "sensors/mid360_airframe.h"
 #include "sensors/mid360_echo.h"
+#include "sensors/mid360_packets.h"
 #include "sensors/mid360_pattern.h"
 #include "sensors/scene.h"
 
 namespace arex::sim {
 
 struct Mid360Config {
-  double rate_hz = 10;  ///< frames (datasheet); a whole number of ticks each
+  double rate_hz = 10;  ///< frames (datasheet; driver 5-50); a whole number of ticks each
   PatternMode pattern = PatternMode::kDevice;
+  double pattern_turn_deg = Mid360Pattern::kUnitTurn_deg;  ///< of the device about its z
   bool noise_free = false;
+  double packet_jitter_s = 259e-6;  ///< RMS of the packets' stamps, measured unit
+  bool misses_in_bag = false;
   EchoConfig echo;
   double beam_half_angle_deg = 0.1;    ///< [E] half of 0.28 x 0.03 deg FWHM of the maker's siblings
                                        ///< (HAP, Mid-70), taken round
@@ -42,7 +46,13 @@ struct Mid360Config {
   void fields(auto& f) {
     f("rate_hz", rate_hz, "frames (datasheet)");
     f("pattern", pattern, "device: a measured unit; table: the maker's table");
-    f("noise_free", noise_free, "exact ranges and angles, every surface in range returns");
+    f("pattern_turn_deg", pattern_turn_deg,
+      "the device's pattern about the sensor's z; as measured its lines stack at 0 and 180 "
+      "degrees");
+    f("noise_free", noise_free, "exact ranges, angles and times, every surface in range returns");
+    f("packet_jitter_s", packet_jitter_s,
+      "RMS of the stamps of packets of 96 points: point times may run backwards; 0 none");
+    f("misses_in_bag", misses_in_bag, "a bag has firings without a return, as the driver: zeros");
     f("echo", echo, "how a beam measures what it meets");
     f("beam_half_angle_deg", beam_half_angle_deg, "half-width of the beam [E]");
     f("echo_separation_m", echo_separation_m, "nearer echoes of one beam merge into one [E]");
@@ -60,9 +70,11 @@ struct Mid360Config {
     f("fault_false_burst_from_s", fault_false_burst_from_s, "start of a burst of false returns");
     f("fault_false_burst_for_s", fault_false_burst_for_s, "length of that burst");
     f("fault_false_burst_fraction", fault_false_burst_fraction, "share of false returns in it");
-    f.check(rate_hz >= 1 && rate_hz <= 1000, "1 <= rate_hz <= 1000");
+    f.check(rate_hz >= 5 && rate_hz <= 50, "5 <= rate_hz <= 50");
+    f.check(packet_jitter_s >= 0 && packet_jitter_s <= 0.01, "0 <= packet_jitter_s <= 0.01");
     f.check(!(rate_hz > 0) || period() % kNanosecondsPerTick == 0,
             "1 / rate_hz a whole number of milliseconds");
+    f.check(pattern_turn_deg >= -360 && pattern_turn_deg <= 360, "-360 <= pattern_turn_deg <= 360");
     f.check(beam_half_angle_deg >= 0 && beam_half_angle_deg < 5, "0 <= beam_half_angle_deg < 5");
     f.check(echo_separation_m >= 0, "echo_separation_m >= 0");
     f.check(merged_share >= 0 && merged_share <= 1, "0 <= merged_share <= 1");
@@ -89,8 +101,13 @@ class Mid360 : public LidarModel {
          const std::vector<worlds::CollisionShape>& airframe_B, std::uint64_t seed);
 
   [[nodiscard]] Stamp period() const override { return config_.period(); }
+  /// Firings of the frame's first packet may lie within the tick before it.
   /// @throws std::invalid_argument unless the stamps are consecutive ticks.
-  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks) const override;
+  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks, Stamp frame_begin = 0) const override;
+  [[nodiscard]] LidarScan frame(Stamp begin, Stamp end,
+                                std::span<const LidarScan> parts) const override {
+    return packets_.frame(begin, end, parts);
+  }
 
   /// The beams of a frame in firing order, as the scan casts them; for tests and benchmarks.
   [[nodiscard]] std::vector<Ray> beams(std::span<const Truth> ticks) const;
@@ -101,12 +118,14 @@ class Mid360 : public LidarModel {
   void meet_airframe(Tick& tick) const;
   void split_beams(Tick& tick) const;
   void receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>& points) const;
+  [[nodiscard]] std::uint8_t tag_of(const Tick& tick, std::size_t beam) const;
 
   Mid360Config config_;
   const Scene& scene_;
   Pose X_BL_;  ///< true mounting
   Mid360Pattern pattern_;
   EchoModel echo_;
+  LidarPackets packets_;
   AirframeMask body_;
   AirframeMask rotors_;
   RandomStream stream_;        ///< returns, noise, false alarms

@@ -12,6 +12,9 @@ namespace {
 constexpr double kLeastCosine = 0.05;
 // The device's scale: 150 is a perfect diffuse reflector, above it retro-reflectors.
 constexpr float kDiffuseFullScale = 150;
+constexpr float kFullScale = 255;
+// Times a perfect diffuse reflector.
+constexpr double kBrightestRetroReflector = 1000;
 
 }  // namespace
 
@@ -75,7 +78,19 @@ bool EchoModel::bright_enough(float range_m, float reflectivity, float cos_incid
   return fraction <= 1 && reflectivity * cos_incidence >= look_up(needed_, fraction);
 }
 
+float EchoModel::margin(float range_m, float reflectivity, float cos_incidence) const {
+  const float needed = look_up(needed_, range_m / static_cast<float>(config_.max_range_m));
+  return reflectivity * cos_incidence / std::max(needed, 1e-9F);
+}
+
 float EchoModel::intensity(float reflectivity, float cos_incidence) {
+  if (reflectivity > 1) {
+    const double light = std::max(1.0, static_cast<double>(reflectivity * cos_incidence));
+    const double decades = std::log(light) / std::log(kBrightestRetroReflector);
+    return static_cast<float>(
+        kDiffuseFullScale + 1 +
+        std::round((kFullScale - kDiffuseFullScale - 1) * std::min(decades, 1.0)));
+  }
   return std::round(kDiffuseFullScale * std::clamp(reflectivity * cos_incidence, 0.0F, 1.0F));
 }
 

@@ -72,7 +72,11 @@ class EchoModel {
   [[nodiscard]] float fast_return_probability(float cos_incidence) const;
   /// Whether enough light returns: reflectivity * cos(incidence) against the range's need.
   [[nodiscard]] bool bright_enough(float range_m, float reflectivity, float cos_incidence) const;
-  /// As the device reports it, 0..150 for a diffuse surface of 0..100 %, range compensated.
+  /// By how much more light returns than the least that is detected. @pre bright_enough
+  [[nodiscard]] float margin(float range_m, float reflectivity, float cos_incidence) const;
+  /// As the device reports it, range compensated: 0..150 for a diffuse surface of 0..100 %,
+  /// 151..255 for a retro-reflector that returns 1 to 1000 times as much as a perfect diffuse one,
+  /// logarithmic [E].
   [[nodiscard]] static float intensity(float reflectivity, float cos_incidence);
 
   [[nodiscard]] const EchoConfig& config() const { return config_; }

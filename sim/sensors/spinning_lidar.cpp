@@ -58,14 +58,15 @@ SpinningLidar::Firing SpinningLidar::firing(std::int64_t number) const {
           so3::from_yaw(azimuth) * fan_L_[static_cast<std::size_t>(ring)]};
 }
 
-LidarScan SpinningLidar::scan(std::span<const Truth> ticks) const {
+LidarScan SpinningLidar::scan(std::span<const Truth> ticks, Stamp frame_begin) const {
   if (ticks.size() < 2) throw std::invalid_argument("a LiDAR scan needs at least two ticks");
   LidarScan scan;
   scan.stamp = ticks.front().stamp;
   scan.end = ticks.back().stamp;
   const std::int64_t of_turn = std::int64_t{config_.columns} * config_.rings;
+  const Stamp from = std::max(scan.stamp, frame_begin);
   std::int64_t number =
-      scan.stamp / period() * of_turn + (scan.stamp % period() * of_turn + period() - 1) / period();
+      from / period() * of_turn + (from % period() * of_turn + period() - 1) / period();
   std::vector<Firing> firings;
   std::vector<Ray> rays;
   std::size_t tick = 0;
@@ -85,6 +86,19 @@ LidarScan SpinningLidar::scan(std::span<const Truth> ticks) const {
     scan.points.push_back(*point);
   }
   return scan;
+}
+
+LidarScan SpinningLidar::frame(Stamp begin, Stamp end, std::span<const LidarScan> parts) const {
+  LidarScan frame;
+  frame.stamp = begin;
+  frame.end = end;
+  for (const LidarScan& part : parts) {
+    for (LidarPoint point : part.points) {
+      point.offset_ns = static_cast<std::uint32_t>(part.stamp + point.offset_ns - begin);
+      frame.points.push_back(point);
+    }
+  }
+  return frame;
 }
 
 std::optional<LidarPoint> SpinningLidar::receive(const Firing& firing, const Ray& ray,

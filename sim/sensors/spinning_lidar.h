@@ -66,7 +66,9 @@ class SpinningLidar : public LidarModel {
                 const std::vector<worlds::CollisionShape>& airframe_B, std::uint64_t seed);
 
   [[nodiscard]] Stamp period() const override;
-  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks) const override;
+  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks, Stamp frame_begin = 0) const override;
+  [[nodiscard]] LidarScan frame(Stamp begin, Stamp end,
+                                std::span<const LidarScan> parts) const override;
 
  private:
   struct Firing;

@@ -263,7 +263,7 @@ TEST(Car, HasItsKindsSizeAndStandsOnItsWheels) {
     const World world = mesh.finish();
     EXPECT_GE(world.mesh.triangles.size(), 100U);
     EXPECT_LE(world.mesh.triangles.size(), 500U);
-    ASSERT_EQ(world.objects.size(), 3U);
+    ASSERT_EQ(world.objects.size(), 4U);
     const auto by_object = probe::triangles_by_object(world);
     const Eigen::AlignedBox3d body = probe::box_of(world, by_object[0]);
     const Eigen::AlignedBox3d tyres = probe::box_of(world, by_object[2]);

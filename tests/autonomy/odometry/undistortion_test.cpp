@@ -64,6 +64,47 @@ TEST(Undistortion, PutsEveryPointWhereItIsAtTheScansEnd) {
   EXPECT_LT(worst, 0.001);     // the issue asks for 5 mm
 }
 
+// Packets are stamped with jitter: times run backwards, and end past the last segment.
+TEST(Undistortion, GoesByThePointsOwnTimesInAnyOrder) {
+  std::vector<MotionSegment> segments;
+  const Circle motion;
+  NavigationState x;
+  x.R_OB = motion.at(0).R;
+  x.p_OB = motion.at(0).p;
+  x.v_OB = Vec3(motion.speed, 0, 0);
+  std::vector<ImuSample> samples;
+  for (Stamp t = 0; t <= 110'000'000; t += 5'000'000) samples.push_back(motion.imu(t));
+  for (const ImuInterval& imu : imu_intervals(samples, 0, 100'000'000, 1.0)) {
+    segments.push_back(motion_segment(x, imu));
+    x = propagate(x, imu);
+  }
+  RandomStream random(2, "points");
+  LidarScan in_order;
+  in_order.end = 100'000'000;
+  for (std::uint32_t i = 0; i < 2000; ++i) {
+    LidarPoint point;
+    point.offset_ns = i * 50'330;  // the last at 100.6 ms
+    point.p_L = (10 * random.normal3().normalized()).cast<float>();
+    in_order.points.push_back(point);
+  }
+  LidarScan shuffled = in_order;
+  for (std::size_t i = 0; i < shuffled.points.size(); ++i) {
+    std::swap(shuffled.points[i],
+              shuffled.points[static_cast<std::size_t>(random.uniform_int(0, 1999))]);
+  }
+  const auto expected = undistort(in_order, segments, kXBL, LidarNoiseConfig{}, 0.3);
+  const auto points = undistort(shuffled, segments, kXBL, LidarNoiseConfig{}, 0.3);
+  ASSERT_EQ(points.size(), 2000U);
+  for (const ScanPoint& point : points) {
+    const std::uint32_t i = shuffled.points[point.index].offset_ns / 50'330;
+    ASSERT_EQ(point.p_L, expected[i].p_L);
+    const double t = 1e-9 * in_order.points[i].offset_ns;
+    const Vec3 truth = (motion.at(0.1) * kXBL).inverse() *
+                       (motion.at(t) * (kXBL * in_order.points[i].p_L.cast<double>()));
+    ASSERT_LT((point.p_L.cast<double>() - truth).norm(), 0.001);
+  }
+}
+
 TEST(Undistortion, LeavesAStandingScanAsItIs) {
   MotionSegment still;
   still.end = 100'000'000;

@@ -110,6 +110,31 @@ TEST(LidarWatch, NoticesATenthOfTheReturnsFalse) {
   }
 }
 
+// The neighbours of a firing are the device's, not the clock's: packets that were stamped so that
+// they overlap tell the same.
+TEST(LidarWatch, CountsFiringsWhereTimesRunBackwards) {
+  const LidarWatch watch{LidarWatchConfig{}};
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    RandomStream random(seed, "watch");
+    LidarScan scan = make_scan(kFrame, {.missing = 0.1, .spikes = 0.05}, 0.04, random);
+    std::erase_if(scan.points, [](const LidarPoint& p) { return p.offset_ns >= 19'968 * 5'000; });
+    const LidarWatch::Survey exact = watch.survey(scan);
+    for (std::uint32_t i = 0; i < 208; ++i) {
+      scan.packets_ns.push_back(i * 480'000 +
+                                static_cast<std::uint32_t>(random.uniform_int(0, 1'000'000)));
+    }
+    for (LidarPoint& point : scan.points) {
+      point.firing = static_cast<std::uint16_t>(point.offset_ns / 5'000);
+      point.offset_ns = scan.firing_ns(point.firing);
+    }
+    const LidarWatch::Survey jittered = watch.survey(scan);
+    EXPECT_EQ(jittered.between, exact.between);
+    EXPECT_EQ(jittered.missing, exact.missing);
+    EXPECT_EQ(jittered.spikes, exact.spikes);
+    EXPECT_GT(exact.missing, 1000);
+  }
+}
+
 TEST(LidarWatch, NoticesReturnsThatFitNothing) {
   Watching w(1);
   w.count_from_here();

@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   const Pose X_BC = VehicleConfig{}.X_BC();
   sim::D430 device(config, world, X_BC, 1);
   sim::Renderer renderer(world, config.camera(), {.far_m = config.draw_range_m});
-  sim::StereoModel stereo(config);
+  sim::StereoModel stereo(config.as_built(1), 1);
   std::printf("%zu triangles, %zu chunks\n", world.mesh.triangles.size(), world.mesh.chunks.size());
 
   RandomStream random(2, "poses");
@@ -47,7 +47,8 @@ int main(int argc, char** argv) {
     const double t0 = cpu_ms();
     renderer.render_inverse_depth(X_WB * X_BC, inverse_depth);
     const double t1 = cpu_ms();
-    stereo.measure(inverse_depth, static_cast<std::uint64_t>(i), depth);
+    stereo.measure(inverse_depth, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(i),
+                   depth);
     const double t2 = cpu_ms();
     const DepthImagePtr image = device.capture(i, X_WB);
     const double t3 = cpu_ms();

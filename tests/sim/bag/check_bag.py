@@ -20,7 +20,8 @@ IMU, SCAN, DEPTH = 5_000_000, 100_000_000, 33_333_333
 POINT = struct.Struct("<ffffIBB")
 FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("intensity", 12, 7, 1),
           ("offset_time", 16, 6, 1), ("line", 20, 2, 1), ("tag", 21, 2, 1)]
-TOPICS = {"/imu/data": ("sensor_msgs/Imu", 200), "/livox/lidar": ("sensor_msgs/PointCloud2", 10),
+TOPICS = {"/imu/data": ("sensor_msgs/Imu", 200), "/imu/mag": ("sensor_msgs/MagneticField", 200),
+          "/livox/lidar": ("sensor_msgs/PointCloud2", 10),
           "/truth": ("nav_msgs/Odometry", 200), "/camera/depth": ("sensor_msgs/Image", 3),
           "/camera/camera_info": ("sensor_msgs/CameraInfo", 3),
           "/tf_static": ("tf2_msgs/TFMessage", 1)}
@@ -49,6 +50,13 @@ def check_imu(i, time, m):
     expect(m.orientation_covariance, (-1,) + 8 * (0,), f"orientation covariance {i}")
     expect(m.angular_velocity_covariance + m.linear_acceleration_covariance, 18 * (0,),
            f"imu covariance {i}")
+
+
+def check_field(i, time, m):
+    check_header(m.header, i, i * IMU, "base_link", f"field {i}")
+    expect(time, i * IMU + EPOCH, f"field {i} recorded")
+    expect(xyz(m.magnetic_field), (1e-4 * 0.5, 1e-4 * (0.25 * i), 1e-4 * -0.125), f"field {i}")
+    expect(m.magnetic_field_covariance, 9 * (0,), f"field covariance {i}")
 
 
 def check_scan(i, time, m):
@@ -119,7 +127,7 @@ def check_tf(_, time, m):
             sys.exit(f"{frame}: rotation {q}")
 
 
-CHECKS = {"/imu/data": check_imu, "/livox/lidar": check_scan, "/truth": check_truth,
+CHECKS = {"/imu/data": check_imu, "/imu/mag": check_field, "/livox/lidar": check_scan, "/truth": check_truth,
           "/camera/depth": check_depth, "/camera/camera_info": check_camera_info,
           "/tf_static": check_tf}
 
@@ -177,6 +185,17 @@ def check_killed(file):
            (8, True, True), "left by a killed run")
 
 
+def check_misses(file):
+    """Firings without a return have their time and line, and zeros."""
+    with rosbag.Bag(file) as bag:
+        (_, scan, _), = bag.read_messages("/livox/lidar")
+    expect(scan.width, 192, "firings")
+    for k, point in enumerate(POINT.iter_unpack(scan.data)):
+        time = (1000, 381_000)[k // 96] + 5000 * (k % 96)
+        wanted = (1 + k, 2, 3, 7, time, k % 4, 5) if k % 5 == 0 else (0, 0, 0, 0, time, k % 4, 0)
+        expect(point, wanted, f"firing {k}")
+
+
 def main():
     write_bag = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
@@ -190,6 +209,7 @@ def main():
         check_bag(write("lz4", "close", "lz4.bag"), "lz4")
         expect(filecmp.cmp(plain, write("none", "close", "again.bag"), shallow=False), True,
                "the same bytes again")
+        check_misses(write("none", "misses", "misses.bag"))
         check_killed(write("none", "kill", "killed.bag") + ".active")
 
 

@@ -186,12 +186,13 @@ TEST(Scenario, SoftwareThatCannotKeepUpIsRefused) {
     return "";
   };
   EXPECT_EQ(message({"lidar.rate_hz=20"}), "");
-  EXPECT_NE(message({"lidar.rate_hz=100"}).find("odometry.latency_s <= 1 / l"), std::string::npos);
-  EXPECT_EQ(message({"lidar.rate_hz=100", "odometry.latency_s=0.01", "mapping.latency_s=0.005"}),
-            "");
+  EXPECT_NE(
+      message({"lidar.rate_hz=50", "odometry.latency_s=0.03"}).find("odometry.latency_s <= 1 / l"),
+      std::string::npos);
+  EXPECT_EQ(message({"lidar.rate_hz=50", "odometry.latency_s=0.01", "mapping.latency_s=0.01"}), "");
   EXPECT_NE(message({"mapping.latency_s=0.06"}).find("mapping.latency_s <= 1 / ("),
             std::string::npos);
-  EXPECT_NE(message({"lidar.rate_hz=7"}).find("whole number of milliseconds"), std::string::npos);
+  EXPECT_NE(message({"lidar.rate_hz=30"}).find("whole number of milliseconds"), std::string::npos);
 }
 
 std::string refusal(const std::string& scenario, const std::vector<std::string>& settings) {
@@ -212,6 +213,8 @@ TEST(Scenario, AKeyThatHasMovedIsRefusedWithTheOneToSetInstead) {
       {"planning.local.true_radius_m=0.4", "vehicle.radius_m"},
       {"planning.replan.degenerate_speed_mps=1", "caution.degenerate_speed_fraction"},
       {"mapping.global.sensor.hit_probability=0.8", "mapping.sensor"},
+      {"imu.vibration.once_per_rev_mps2=4", "imu.vibration.level"},
+      {"depth.noise_kernel_px=5", "depth.noise_grid_px"},
       {"vehicle.own_returns_m=0.5", "vehicle.own_returns_margin_m"},
       {"world.vehicle_radius_m=0.4", "models/arex/arex.xml"}};
   for (const auto& [setting, instead] : moved) {
@@ -344,8 +347,9 @@ TEST(Scenario, SizesThatNoHostHasRoomForAreRefusedByTheirRule) {
        "0.2 <= field_spacing_m"},
       {"depth.width_px=1000000", "width_px <= 4096"},
       {"depth={width_px: 4096, height_px: 4096}", "width_px height_px <= 4e6"},
-      {"lidar.rate_hz=1e-9", "1 <= rate_hz"},
-      {"lidar.rate_hz=0", "1 <= rate_hz"},
+      {"lidar.rate_hz=1e-9", "5 <= rate_hz"},
+      {"lidar.rate_hz=0", "5 <= rate_hz"},
+      {"lidar.rate_hz=100", "rate_hz <= 50"},
       {"scoring.coverage.space.resolution_m=1e-4", "0.05 <= resolution_m"},
       {"scoring.coverage.surface.sample_area_m2=1e-12", "0.002 <= sample_area_m2"},
       {"scoring.coverage.visibility.viewpoint_spacing_m=1e-5", "0.2 <= viewpoint_spacing_m"},

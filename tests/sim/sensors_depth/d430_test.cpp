@@ -48,7 +48,9 @@ TEST(D430, LooksWhereItIsMounted) {
 
 TEST(D430, NoisyFrameOfAWallFollowsTheModel) {
   const worlds::World world = plane_world({3, 0, 0}, Vec3::UnitX(), 20);
-  D430 device({}, world, forward_camera(), 3);
+  D430Config config;
+  config.disparity_bias_px = config.disparity_bias_spread_px = 0;
+  D430 device(config, world, forward_camera(), 3);
   const DepthImagePtr image = device.capture(0, {});
   double squares = 0;
   int n = 0;
@@ -60,8 +62,30 @@ TEST(D430, NoisyFrameOfAWallFollowsTheModel) {
       ++n;
     }
   }
-  const double model = 9 * 0.08 / (446.8 * 0.050);
+  EXPECT_NE(image->camera.fx, 422.6);  // this unit's own
+  const double model = 9 * 0.08 / (image->camera.fx * 0.050);
   EXPECT_NEAR(std::sqrt(squares / n) / model, 1, 0.05);
+}
+
+TEST(D430, KeepsItsViewWhileItHardlyMoves) {
+  const worlds::World world = plane_world({3, 0, 0}, Vec3::UnitX(), 20);
+  D430 device({}, world, forward_camera(), 3);
+  const auto rms_between = [&](const Pose& a, const Pose& b) {
+    const DepthImagePtr first = device.capture(0, a), second = device.capture(1, b);
+    double squares = 0;
+    int n = 0;
+    for (int v = 0; v < 480; ++v) {
+      for (int u = 40; u < 848; ++u) {
+        squares += std::pow(static_cast<double>(first->at(u, v) - second->at(u, v)), 2);
+        ++n;
+      }
+    }
+    return std::sqrt(squares / n);
+  };
+  const Pose here, nearby{Mat3::Identity(), {0, 0.01, 0}}, away{Mat3::Identity(), {0, 0.3, 0}};
+  EXPECT_LT(rms_between(here, nearby), 0.017);
+  EXPECT_GT(rms_between(here, away), 0.035);
+  EXPECT_LT(rms_between(away, away), 0.017);
 }
 
 }  // namespace

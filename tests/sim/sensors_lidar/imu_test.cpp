@@ -17,7 +17,7 @@ ImuConfig quiet() {
   config.gyro_noise_density = config.gyro_walk_density = config.gyro_bias_sigma_radps = 0;
   config.accel_noise_density = config.accel_walk_density = config.accel_bias_sigma_mps2 = 0;
   config.gyro_scale_sigma_fraction = config.accel_scale_sigma_fraction = 0;
-  config.vibration.broadband_mps2 = 0;
+  config.vibration.level = VibrationLevel::kNone;
   return config;
 }
 
@@ -61,10 +61,11 @@ TEST(ImuModel, DeliversEachSensorAtItsRateWithItsClock) {
     const ImuSample raw = imu.sample(at_tick(tick));
     ASSERT_EQ(raw.stamp, tick * kNanosecondsPerTick + 20'000'000);
     ASSERT_EQ(imu.output().has_value(), tick % 5 == 0);
-    ASSERT_EQ(imu.magnetometer().has_value(), tick % 20 == 0);
+    ASSERT_EQ(imu.magnetometer().has_value(), tick % 5 == 0);
     ASSERT_EQ(imu.barometer().has_value(), tick % 20 == 0);
     if (imu.output()) {
       ASSERT_EQ(imu.output()->stamp, raw.stamp);
+      ASSERT_EQ(imu.output()->field_gauss, imu.magnetometer()->field_gauss);
     }
   }
 }
@@ -89,24 +90,58 @@ TEST(ImuModel, WhiteNoiseHasItsDensity) {
   }
 }
 
-// Allan deviation of the default sensor at rest: where white noise rules it is density / sqrt(tau).
-TEST(ImuModel, AllanDeviationFollowsTheDensity) {
-  constexpr double kTau_s = 0.1;
-  constexpr int kCluster = 100, kClusters = 3000;
+/// Overlapping Allan variance of rates sampled every `step_s`, by their integral.
+double allan_variance(const std::vector<double>& integral, double step_s, std::size_t cluster) {
+  double sum = 0;
+  const std::size_t count = integral.size() - 2 * cluster;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double d = integral[i + 2 * cluster] - 2 * integral[i + cluster] + integral[i];
+    sum += d * d;
+  }
+  const double tau = step_s * static_cast<double>(cluster);
+  return sum / (2 * tau * tau * static_cast<double>(count));
+}
+
+// An hour at rest, as the stack gets it: white noise over short times, the walk over long ones,
+// N^2 / tau + K^2 tau / 3. Pixhawk 6-series at rest (Allan): accelerometer 6.2e-4 to 1.0e-3, gyro
+// 6.1e-5 to 6.3e-5, walks 2.6e-5 and 9e-7 (6C).
+TEST(ImuModel, AllanDeviationOverAnHourIsThatOfItsDensities) {
+  constexpr double kStep_s = 0.1;
+  constexpr int kPerStep = 20;  // of 200 Hz
+  constexpr int kTicks = 3'600'000;
+  std::array<std::vector<double>, 6> integral;
   ImuModel imu(ImuConfig{}, 3);
-  Vec3 previous = Vec3::Zero(), sum = Vec3::Zero();
-  for (int c = 0; c < kClusters; ++c) {
-    Vec3 mean = Vec3::Zero();
-    for (int i = 0; i < kCluster; ++i) {
-      mean += imu.sample(at_tick(std::int64_t{c} * kCluster + i)).gyro_radps / kCluster;
+  Vec3 gyro = Vec3::Zero(), accel = Vec3::Zero();
+  int samples = 0;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    imu.sample(at_tick(tick));
+    if (!imu.output()) continue;
+    gyro += imu.output()->gyro_radps * 0.005;
+    accel += (imu.output()->accel_mps2 - Vec3(0, 0, kGravity)) * 0.005;
+    if (++samples % kPerStep != 0) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      integral[static_cast<std::size_t>(axis)].push_back(gyro[axis]);
+      integral[static_cast<std::size_t>(axis) + 3].push_back(accel[axis]);
     }
-    if (c > 0) sum += (mean - previous).cwiseAbs2();
-    previous = mean;
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const double allan = std::sqrt(sum[axis] / (2 * (kClusters - 1)));
-    EXPECT_NEAR(allan, 1.0e-4 / std::sqrt(kTau_s), 0.05 * 1.0e-4 / std::sqrt(kTau_s));
-  }
+  const ImuConfig config;
+  const auto expect = [&](std::size_t first, double white, double walk) {
+    for (const double tau : {0.1, 1.0, 10.0, 100.0, 300.0}) {
+      const auto cluster = static_cast<std::size_t>(tau / kStep_s + 0.5);
+      double mean = 0;
+      for (std::size_t axis = first; axis < first + 3; ++axis) {
+        mean += allan_variance(integral[axis], kStep_s, cluster) / 3;
+      }
+      const double expected = white * white / tau + walk * walk * tau / 3;
+      // Three axes of an hour have some 3 * 3600 / tau clusters of their own.
+      EXPECT_NEAR(std::sqrt(mean / expected), 1, 0.03 + 2 * std::sqrt(0.5 * tau / 10'800))
+          << "from " << first << " over " << tau << " s";
+    }
+  };
+  expect(0, config.gyro_noise_density, config.gyro_walk_density);
+  expect(3, config.accel_noise_density, config.accel_walk_density);
+  EXPECT_LE(config.accel_walk_density, 1e-4);
+  EXPECT_TRUE(config.gyro_walk_density >= 1e-6 && config.gyro_walk_density <= 1e-5);
 }
 
 TEST(ImuModel, BiasesStartWithTheirSpreadAndWalk) {
@@ -133,8 +168,8 @@ TEST(ImuModel, BiasesStartWithTheirSpreadAndWalk) {
   const double root_time = std::sqrt(1e-3 * kTicks);
   EXPECT_NEAR(rms(gyro0) / 0.002, 1, 0.05);
   EXPECT_NEAR(rms(accel0) / 0.03, 1, 0.05);
-  EXPECT_NEAR(rms(gyro_walk) / (2.0e-5 * root_time), 1, 0.05);
-  EXPECT_NEAR(rms(accel_walk) / (1.0e-3 * root_time), 1, 0.05);
+  EXPECT_NEAR(rms(gyro_walk) / (2.0e-6 * root_time), 1, 0.05);
+  EXPECT_NEAR(rms(accel_walk) / (5.0e-5 * root_time), 1, 0.05);
 }
 
 TEST(ImuModel, ClipsAtItsRange) {
@@ -147,75 +182,21 @@ TEST(ImuModel, ClipsAtItsRange) {
   EXPECT_TRUE(sample.accel_mps2.isApprox(Vec3(-16 * kGravity, 0, 16 * kGravity)));
 }
 
-struct Series {
-  std::vector<double> accel_x, accel_z, gyro_x, output_x;
-};
-
-Series record(ImuModel& imu, const std::array<double, 4>& rotor_radps, int seconds) {
-  Series series;
-  for (int i = 0; i < 1000 * seconds; ++i) {
-    Truth truth = at_tick(i);
-    truth.rotor_radps = rotor_radps;
-    const ImuSample sample = imu.sample(truth);
-    series.accel_x.push_back(sample.accel_mps2.x());
-    series.accel_z.push_back(sample.accel_mps2.z() - kGravity);
-    series.gyro_x.push_back(sample.gyro_radps.x());
-    if (imu.output()) series.output_x.push_back(imu.output()->accel_mps2.x());
-  }
-  return series;
-}
-
-TEST(ImuVibration, LinesOfOneRotorGrowWithTheSquareOfItsSpeed) {
-  for (const double revolutions : {114.0, 57.0}) {  // per second; whole turns in the record
-    const double speed = 2 * kPi * revolutions;
-    const double growth = 0.5 * std::pow(speed / 716, 2);
-    ImuModel imu(quiet(), 4);
-    const Series series = record(imu, {speed, 0, 0, 0}, 4);
-    EXPECT_NEAR(amplitude(series.accel_x, revolutions, 1000), 2 * growth, 0.01 * growth);
-    EXPECT_NEAR(amplitude(series.accel_z, 2 * revolutions, 1000), 1 * growth, 0.01 * growth);
-    EXPECT_NEAR(amplitude(series.gyro_x, revolutions, 1000), 0.03 * growth, 0.001 * growth);
-    EXPECT_LT(amplitude(series.accel_x, revolutions + 5, 1000), 0.01 * growth);
-  }
-}
-
-TEST(ImuVibration, FourRotorsAddToTheConfiguredRms) {
-  // Near hover and a hertz apart: a peak of 2 m/s^2 has an RMS of sqrt 2.
-  ImuModel imu(quiet(), 5);
-  std::array<double, 4> speeds{};
-  for (std::size_t i = 0; i < 4; ++i) speeds[i] = 2 * kPi * (112.5 + static_cast<double>(i));
-  const Series series = record(imu, speeds, 4);
-  double x = 0, z = 0, gyro = 0;
-  for (std::size_t i = 0; i < series.accel_x.size(); ++i) {
-    x += std::pow(series.accel_x[i], 2) / 4000;
-    z += std::pow(series.accel_z[i], 2) / 4000;
-    gyro += std::pow(series.gyro_x[i], 2) / 4000;
-  }
-  EXPECT_NEAR(std::sqrt(x), 2 / std::numbers::sqrt2, 0.05 * 1.414);
-  EXPECT_NEAR(std::sqrt(z), 1 / std::numbers::sqrt2, 0.05 * 0.707);
-  EXPECT_NEAR(std::sqrt(gyro), 0.03 / std::numbers::sqrt2, 0.05 * 0.0212);
-}
-
-TEST(ImuVibration, BroadbandHasItsRms) {
-  ImuConfig config = quiet();
-  config.vibration.broadband_mps2 = 0.3;
-  config.vibration.once_per_rev_mps2 = 0;
-  ImuModel imu(config, 6);
-  const Series series = record(imu, {716, 716, 716, 716}, 10);
-  double sum = 0;
-  for (const double value : series.accel_x) sum += value * value;
-  EXPECT_NEAR(std::sqrt(sum / 10'000), 0.3, 0.05 * 0.3);
-}
-
-TEST(ImuVibration, AliasesInTheOutputAsTheFilterLeavesIt) {
-  // One per revolution at 114 Hz lies above half of 200 Hz and comes out at 86 Hz.
+TEST(ImuModel, OutputAliasesAsTheFilterLeavesIt) {
+  // 114 Hz, about one per revolution, lies above half of 200 Hz and comes out at 86 Hz.
   ImuModel imu(quiet(), 7);
-  const double speed = 2 * kPi * 114;
-  const Series series = record(imu, {speed, 0, 0, 0}, 4);
+  std::vector<double> output;
+  for (int i = 0; i < 4000; ++i) {
+    Truth truth = at_tick(i);
+    truth.a_WB.x() = std::cos(2 * kPi * 0.114 * i);
+    imu.sample(truth);
+    if (imu.output()) output.push_back(imu.output()->accel_mps2.x());
+  }
   const double ratio = std::tan(kPi * 114e-3) / std::tan(kPi * 90e-3);
-  const double expected = std::pow(speed / 716, 2) / std::sqrt(1 + std::pow(ratio, 4));
+  const double expected = 1 / std::sqrt(1 + std::pow(ratio, 4));
   // The first of four seconds still holds the filter's transient, 0.1 % of the record.
-  EXPECT_NEAR(amplitude(series.output_x, 86, 200), expected, 0.02 * expected);
-  EXPECT_LT(amplitude(series.output_x, 50, 200), 0.02 * expected);
+  EXPECT_NEAR(amplitude(output, 86, 200), expected, 0.02 * expected);
+  EXPECT_LT(amplitude(output, 50, 200), 0.02 * expected);
 }
 
 TEST(ImuModel, OutputPassesSlowMotionWithTheFiltersDelay) {
@@ -271,16 +252,16 @@ TEST(ImuModel, MagnetometerAndBarometerReadTheEarth) {
   const double expected_pressure = 101325 * std::exp(-50 / 8434.5);
   constexpr int kSamples = 5000;
   for (int i = 0; i < kSamples; ++i) {
-    truth.stamp = i * Stamp{20} * kNanosecondsPerTick;
+    truth.stamp = i * Stamp{20} * kNanosecondsPerTick;  // due for all
     imu.sample(truth);
     field += imu.magnetometer()->field_gauss / kSamples;
     field2 += (imu.magnetometer()->field_gauss - expected_field).cwiseAbs2() / kSamples;
     pressure += imu.barometer()->pressure_pa / kSamples;
     pressure2 += std::pow(imu.barometer()->pressure_pa - expected_pressure, 2) / kSamples;
   }
-  EXPECT_LT((field - expected_field).norm(), 2e-4);
+  EXPECT_LT((field - expected_field).norm(), 4e-4);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(std::sqrt(field2[axis]), 4e-4 * std::sqrt(50), 0.05 * 2.83e-3);
+    EXPECT_NEAR(std::sqrt(field2[axis]), 4e-4 * std::sqrt(200), 0.05 * 5.66e-3);
   }
   EXPECT_NEAR(pressure, expected_pressure, 0.1);
   EXPECT_NEAR(std::sqrt(pressure2), 1.0, 0.05);

@@ -14,8 +14,9 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kCloudCell = 0.2;      // m, of the stand-in for a 2D map
-constexpr std::size_t kMaxPath = 3000;  // corners of a drawn path
+constexpr double kCloudCell = 0.2;             // m, of the stand-in for a 2D map
+constexpr std::size_t kMaxPath = 3000;         // corners of a drawn path
+constexpr std::size_t kMaxOverlaidPath = 800;  // likewise, of one among many
 
 /// A picture of few colours and its place in O.
 struct Backdrop {
@@ -126,15 +127,19 @@ std::string format(const char* pattern, Numbers... numbers) {
   return text.data();
 }
 
-std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
-  if (poses.empty()) return {};
+std::string points_text(const std::vector<TimedPose>& poses, std::size_t most) {
   std::string points;
-  const std::size_t step = poses.size() / kMaxPath + 1;
+  const std::size_t step = poses.size() / most + 1;
   for (std::size_t i = 0; i < poses.size(); i += step) {
     points += format("%.2f,%.2f ", poses[i].X.p.x(), -poses[i].X.p.y());
   }
-  points += format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
-  return "<polyline class=\"" + std::string(name) + "\" points=\"" + points + "\"/>\n";
+  return points + format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
+}
+
+std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
+  if (poses.empty()) return {};
+  return "<polyline class=\"" + std::string(name) + "\" points=\"" + points_text(poses, kMaxPath) +
+         "\"/>\n";
 }
 
 std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
@@ -175,31 +180,31 @@ std::string scale_bar(const Eigen::AlignedBox2d& box, double unit) {
                 y - 0.5 * unit, 1.6 * unit, length);
 }
 
-}  // namespace
-
-std::string map_picture_svg(const RunRecord& run) {
-  if (run.truth.empty() && run.estimate.empty()) return {};
-  const Backdrop backdrop = run.map ? backdrop_of(*run.map) : backdrop_of(run.cloud.points_O);
-  const std::vector<RunTarget> targets = run_targets(run.events);
-
+/// What a picture shows of the plane, with a rim of one mark's size.
+struct View {
   Eigen::AlignedBox2d box;
-  for (const auto* poses : {&run.truth, &run.estimate}) {
-    for (const TimedPose& pose : *poses) box.extend(pose.X.p.head<2>());
-  }
-  for (const RunTarget& target : targets) box.extend(target.p_O.head<2>());
+  double unit = 0;  ///< what a mark measures
+};
+
+View view_of(Eigen::AlignedBox2d box, const Backdrop& backdrop) {
   if (backdrop.width > 0) {
     box.extend(Vec2(backdrop.x_m, backdrop.y_m));
     box.extend(Vec2(backdrop.x_m + backdrop.width * backdrop.cell_m,
                     backdrop.y_m - backdrop.height * backdrop.cell_m));
   }
-  const double unit = std::max(5.0, box.sizes().maxCoeff()) / 80;  // what a mark measures
+  const double unit = std::max(5.0, box.sizes().maxCoeff()) / 80;
   box.extend(Vec2(box.min() - Vec2::Constant(unit)));
   box.extend(Vec2(box.max() + Vec2::Constant(unit)));
+  return {box, unit};
+}
 
-  std::string svg = format(
-      "<svg id=\"path-map\" role=\"img\" aria-label=\"Flown path over the 2D map\" "
-      "viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\">\n",
-      box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), unit);
+// The picture's beginning: its frame and what is known of the plane.
+std::string open_svg(const View& view, const Backdrop& backdrop, const char* attributes) {
+  const Eigen::AlignedBox2d& box = view.box;
+  std::string svg =
+      format("<svg class=\"map\" role=\"img\" viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\" ",
+             box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), view.unit) +
+      attributes + ">\n";
   if (backdrop.width > 0) {
     svg += format(
                "<image x=\"%.3f\" y=\"%.3f\" width=\"%.3f\" height=\"%.3f\" "
@@ -208,6 +213,30 @@ std::string map_picture_svg(const RunRecord& run) {
                backdrop.height * backdrop.cell_m) +
            png_data_uri(backdrop) + "\"/>\n";
   }
+  return svg;
+}
+
+Backdrop backdrop_of(const RunRecord& run) {
+  return run.map ? backdrop_of(*run.map) : backdrop_of(run.cloud.points_O);
+}
+
+}  // namespace
+
+std::string map_picture_svg(const RunRecord& run) {
+  if (run.truth.empty() && run.estimate.empty()) return {};
+  const Backdrop backdrop = backdrop_of(run);
+  const std::vector<RunTarget> targets = run_targets(run.events);
+
+  Eigen::AlignedBox2d box;
+  for (const auto* poses : {&run.truth, &run.estimate}) {
+    for (const TimedPose& pose : *poses) box.extend(pose.X.p.head<2>());
+  }
+  for (const RunTarget& target : targets) box.extend(target.p_O.head<2>());
+  const View view = view_of(box, backdrop);
+  const double unit = view.unit;
+
+  std::string svg =
+      open_svg(view, backdrop, "id=\"path-map\" aria-label=\"Flown path over the 2D map\"");
   svg += candidates_svg(run.decisions, 0.5 * unit);
   svg += polyline(run.truth, "truth");
   svg += polyline(run.estimate, "estimate");
@@ -227,7 +256,32 @@ std::string map_picture_svg(const RunRecord& run) {
                   -1.6 * unit, 1.6 * unit) +
            "<title>end</title></path>\n";
   }
-  return svg + scale_bar(box, unit) + "</svg>\n";
+  return svg + scale_bar(view.box, unit) + "</svg>\n";
+}
+
+std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<DrawnPath>& paths) {
+  Eigen::AlignedBox2d box;
+  for (const DrawnPath& path : paths) {
+    for (const TimedPose& pose : *path.poses) box.extend(pose.X.p.head<2>());
+  }
+  if (box.isEmpty()) return {};
+  const Backdrop backdrop = backdrop_of(backdrop_run);
+  const View view = view_of(box, backdrop);
+  std::string svg = open_svg(view, backdrop, "aria-label=\"Flown paths over the map\"");
+  std::string ends;
+  for (const auto& [poses, colour, title] : paths) {
+    if (poses->empty()) continue;
+    const std::string name = "<title>" + escape_markup(title) + "</title>";
+    svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
+           points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
+    const Vec3& end = poses->back().X.p;
+    ends += format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" style=\"fill:", end.x(), -end.y(),
+                   0.6 * view.unit) +
+            colour + "\">" + name + "</circle>\n";
+  }
+  const Vec3& start = paths.front().poses->front().X.p;
+  svg += ends + circle(start.x(), start.y(), 0.9 * view.unit, "start", "start");
+  return svg + scale_bar(view.box, view.unit) + "</svg>\n";
 }
 
 }  // namespace arex::sim

@@ -1,5 +1,6 @@
 #include "report/page.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -38,6 +39,20 @@ std::string number_text(double value, int digits) {
   std::array<char, 48> text{};
   std::snprintf(text.data(), text.size(), "%.*g", digits, value);
   return text.data();
+}
+
+std::string unit_text(const std::string& unit) {
+  std::string text = unit;
+  for (const auto& [plain, raised] : {std::pair{"^2", "²"}, {"^3", "³"}}) {
+    const std::size_t at = text.find(plain);
+    if (at != std::string::npos) text.replace(at, 2, raised);
+  }
+  return text;
+}
+
+std::string words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
 }
 
 std::string percent_text(double share) {

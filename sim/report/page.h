@@ -22,6 +22,12 @@ std::string key_figures_html(const std::vector<KeyFigure>& figures);
 /// Shortest text of a number with so many significant digits.
 std::string number_text(double value, int digits = 3);
 
+/// A unit as people write it: m² for m^2.
+std::string unit_text(const std::string& unit);
+
+/// A typed name in words: "no candidates" for no_candidates.
+std::string words(std::string name);
+
 /// A share in percent. What is not the whole is never rounded to 100 %.
 std::string percent_text(double share);
 

@@ -1,6 +1,6 @@
 // Writes what the browser test opens: FOLDER/run, FOLDER/old (without the growth of its cloud) and
 // FOLDER/sweep, FOLDER/cube, FOLDER/few (half of one side failed) and FOLDER/none (all did), each
-// with its report.
+// with its report; FOLDER/report.html compares the two runs.
 
 #include <cstdio>
 #include <filesystem>
@@ -34,5 +34,8 @@ int main(int argc, char** argv) {
     write_atomically(sweep / "report.html",
                      comparison_report_html(read_results({sweep}), "Sweep", sweep));
   }
+  write_atomically(
+      folder / "report.html",
+      comparison_report_html(read_results({folder / "run", folder / "old"}), "Two runs", folder));
   return 0;
 }

@@ -69,6 +69,10 @@ struct Centred {
     };
     return still(W, mean_W) || still(O, mean_O);
   }
+  [[nodiscard]] bool lie_on_a_line() const {
+    const Eigen::JacobiSVD<Mat3> svd(W * O.transpose());
+    return svd.singularValues()[1] <= kNoWidth * kNoWidth * svd.singularValues()[0];
+  }
   /// Scale of O that fits best once it is turned.
   [[nodiscard]] double scale(const Mat3& R) const {
     return W.cwiseProduct(R * O).sum() / O.squaredNorm();
@@ -216,9 +220,8 @@ std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment al
   const Centred points(pairs);
   if (points.stands_still()) return std::nullopt;
   if (alignment == Alignment::kYaw) return align_yaw(points);
-  const Eigen::JacobiSVD<Mat3> svd(points.W * points.O.transpose());
-  const bool on_a_line = svd.singularValues()[1] <= kNoWidth * kNoWidth * svd.singularValues()[0];
-  if (on_a_line) return std::nullopt;
+  // On a line only the rotation about it is open, which the scale does not need.
+  if (alignment != Alignment::kScale && points.lie_on_a_line()) return std::nullopt;
   // The best rotation does not depend on the scale.
   const Pose X_WO = align_rigid(pairs);
   if (alignment == Alignment::kSe3) return Similarity{X_WO, 1};

@@ -188,6 +188,21 @@ std::vector<ComparedFigure> figures_of(const Comparison& comparison) {
   return figures;
 }
 
+std::string ComparedFigure::text(std::size_t i) const {
+  const double value = values[i];
+  if (!std::isfinite(value)) return "–";
+  const bool whole = value == std::round(value) && std::abs(value) < 1e15;
+  if (whole || std::abs(value) >= 1000) return fmt::format("{:.0f}", value);
+  return fmt::format("{:.4g}", value);
+}
+
+bool ComparedFigure::is_best(std::size_t i) const {
+  const auto less = [&](double other) { return other < values[i]; };
+  const auto more = [&](double other) { return other > values[i]; };
+  return less_is_better && std::none_of(values.begin(), values.end(), less) &&
+         std::any_of(values.begin(), values.end(), more);
+}
+
 std::string_view alignment_name(Alignment alignment) { return words_of(alignment).name; }
 
 std::string_view alignment_text(Alignment alignment) { return words_of(alignment).text; }

@@ -33,6 +33,11 @@ struct ComparedFigure {
   std::string unit;  ///< empty: a count or a factor
   std::vector<double> values;
   bool less_is_better = false;
+
+  /// Of one estimate: four digits, and all of those before the point.
+  [[nodiscard]] std::string text(std::size_t i) const;
+  /// Whether less is better, and this is the least of different ones.
+  [[nodiscard]] bool is_best(std::size_t i) const;
 };
 std::vector<ComparedFigure> figures_of(const Comparison& comparison);
 

@@ -293,7 +293,8 @@ Evaluation evaluate(const Trajectory& reference, const Trajectory& estimate,
                               : Statistics::kUnknown;
   const auto reference_positions = positions_of(pairs, &PosePair::X_WB);
   const auto estimate_positions = positions_of(pairs, &PosePair::X_OB);
-  evaluation.reference_length_m = distances_along(reference_positions).back();
+  evaluation.distance_m = distances_along(reference_positions);
+  evaluation.reference_length_m = evaluation.distance_m.back();
   evaluation.estimate_length_m = distances_along(estimate_positions).back();
   evaluation.end_error_m =
       (align_at_start(pairs) * pairs.back().X_OB.p - pairs.back().X_WB.p).norm();

@@ -109,6 +109,7 @@ struct Evaluation {
   double width_m = 0;                           ///< width_across()
 
   // Of each pair.
+  std::vector<double> distance_m;  ///< along the reference
   std::vector<double> position_error_m;
   std::vector<double> rotation_error_deg;
   std::vector<double> yaw_error_deg;  ///< empty for KITTI, whose z axis is none of up and down

@@ -1,10 +1,12 @@
 #include "evaluation/trajectory_file.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "config/config.h"
 #include "config/text.h"
@@ -17,6 +19,10 @@ namespace {
 constexpr double kRounding = 0.01;
 // Nobody's clock counts so many seconds: they are nanoseconds.
 constexpr double kNoSeconds = 1e12;
+constexpr std::array<std::pair<TrajectoryFormat, std::string_view>, 3> kNames{
+    {{TrajectoryFormat::kTum, "tum"},
+     {TrajectoryFormat::kEuroc, "euroc"},
+     {TrajectoryFormat::kKitti, "kitti"}}};
 constexpr std::size_t kTumColumns = 8;
 constexpr std::size_t kKittiColumns = 12;
 
@@ -205,15 +211,16 @@ class Parser {
 }  // namespace
 
 std::string_view format_name(TrajectoryFormat format) {
-  switch (format) {
-    case TrajectoryFormat::kTum:
-      return "tum";
-    case TrajectoryFormat::kEuroc:
-      return "euroc";
-    case TrajectoryFormat::kKitti:
-      return "kitti";
+  return std::find_if(kNames.begin(), kNames.end(),
+                      [&](const auto& name) { return name.first == format; })
+      ->second;
+}
+
+std::optional<TrajectoryFormat> format_named(std::string_view name) {
+  for (const auto& [format, its_name] : kNames) {
+    if (its_name == name) return format;
   }
-  return "";
+  return std::nullopt;
 }
 
 Trajectory read_trajectory(const std::filesystem::path& file,

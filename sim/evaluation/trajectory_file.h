@@ -21,6 +21,8 @@ enum class TrajectoryFormat {
 /// What people write for it: tum, euroc, kitti.
 std::string_view format_name(TrajectoryFormat format);
 
+std::optional<TrajectoryFormat> format_named(std::string_view name);
+
 /// A trajectory as another program left it, and what was done to its lines.
 struct Trajectory {
   std::string file;

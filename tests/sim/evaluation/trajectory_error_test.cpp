@@ -83,7 +83,7 @@ std::vector<std::pair<double, double>> matches(const std::vector<double>& refere
 
 TEST(Association, TakesTheNearestStampAndOfTwoTheFirst) {
   using Found = std::vector<std::pair<double, double>>;
-  // evo's own test of it (test_sync.py, 1.36): 0.005 is as near to 0 as to 0.01.
+  // Evo's own test of it (test/test_sync.py at its commit 2d402c5).
   EXPECT_EQ(matches({0, 0.01}, {0.005}, 0.006), (Found{{0, 0.005}}));
   EXPECT_EQ(matches({0.005}, {0, 0.01}, 0.006), (Found{{0.005, 0}}));
   EXPECT_EQ(matches({0, 1, 2}, {0.009, 1.02}, 0.01), (Found{{0, 0.009}}));
@@ -132,8 +132,8 @@ std::vector<Vec3> along_z(const std::vector<double>& heights) {
   return positions;
 }
 
-// The positions and pairs of evo's tests of filter_pairs_by_path (test_filters.py, 1.36). Evo
-// before left the first of consecutive sub-paths out.
+// The positions and pairs of evo's own tests of it (test/test_filters.py at its commit 0c7d611).
+// Older evo left the first of consecutive sub-paths out.
 TEST(SubPaths, AreThoseOfEvosTests) {
   using Found = std::vector<SubPath>;
   const auto all = [](const std::vector<double>& heights, double delta) {

@@ -59,9 +59,9 @@ std::vector<std::string> names_of(const std::vector<Trajectory>& estimates) {
 ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : nullptr; }
 
 ordered_json statistics_json(const Statistics& s) {
-  return {{"rmse", number(s.rmse)}, {"mean", number(s.mean)}, {"median", number(s.median)},
-          {"std", number(s.std)},   {"min", number(s.min)},   {"max", number(s.max)},
-          {"sse", number(s.sse)}};
+  if (std::isnan(s.rmse)) return nullptr;
+  return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.std},
+          {"min", s.min},   {"max", s.max},   {"sse", s.sse}};
 }
 
 ordered_json trajectory_json(const Trajectory& trajectory) {
@@ -171,19 +171,18 @@ std::vector<ComparedFigure> figures_of(const Comparison& comparison) {
   add_statistics("yaw error", "deg", [](const Evaluation& e) { return e.yaw_deg; });
   for (std::size_t i = 0; i < 2 * comparison.options.deltas_m.size(); ++i) {
     const RelativeError& first = comparison.estimates.front().evaluation.relative[i];
-    const std::string over = fmt::format(" over {:g} m, {} sub-paths", first.delta_m,
+    const std::string over = fmt::format("{:g} m, {}", first.delta_m,
                                          first.which == SubPaths::kAll ? "all" : "consecutive");
-    add("relative position error (RPE)" + over + ", RMSE", "m", true,
+    add("relative position error (RPE), " + over + ", RMSE", "m", true,
         [&](const Evaluation& e) { return e.relative[i].translation_m.rmse; });
-    add("relative rotation error" + over + ", RMSE", "deg", true,
+    add("relative rotation error, " + over + ", RMSE", "deg", true,
         [&](const Evaluation& e) { return e.relative[i].rotation_deg.rmse; });
-    add("sub-paths of " + fmt::format("{:g} m, {}", first.delta_m,
-                                      first.which == SubPaths::kAll ? "all" : "consecutive"),
-        "", false, [&](const Evaluation& e) { return e.relative[i].count; });
+    add("sub-paths of " + over, "", false,
+        [&](const Evaluation& e) { return e.relative[i].count; });
   }
-  add("error at the end, first poses made to agree", "m", true,
+  add("error at the end, aligned at the first pose", "m", true,
       [](const Evaluation& e) { return e.end_error_m; });
-  add("the same, of the reference's length", "%", true,
+  add("drift: the same, of the length", "%", true,
       [](const Evaluation& e) { return e.drift_percent; });
   return figures;
 }
@@ -193,7 +192,7 @@ std::string ComparedFigure::text(std::size_t i) const {
   if (!std::isfinite(value)) return "–";
   const bool whole = value == std::round(value) && std::abs(value) < 1e15;
   if (whole || std::abs(value) >= 1000) return fmt::format("{:.0f}", value);
-  return fmt::format("{:.4g}", value);
+  return fmt::format("{:.{}g}", value, unit.empty() ? 6 : 4);
 }
 
 bool ComparedFigure::is_best(std::size_t i) const {

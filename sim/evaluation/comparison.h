@@ -34,7 +34,7 @@ struct ComparedFigure {
   std::vector<double> values;
   bool less_is_better = false;
 
-  /// Of one estimate: four digits, and all of those before the point.
+  /// Of one estimate: four digits, six of a factor, and all of those before the point.
   [[nodiscard]] std::string text(std::size_t i) const;
   /// Whether less is better, and this is the least of different ones.
   [[nodiscard]] bool is_best(std::size_t i) const;

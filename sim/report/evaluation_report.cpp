@@ -32,15 +32,15 @@ std::string header_html(const Comparison& comparison) {
 
 std::string figures_html(const Comparison& comparison) {
   std::string html =
-      "<section>\n<h2>Figures</h2>\n<div class=\"scroll\"><table class=\"data\">\n"
-      "<thead><tr><th class=\"word\">figure</th>";
+      "<section>\n<h2>Figures</h2>\n<div class=\"scroll whole\"><table class=\"data\">\n"
+      "<thead><tr><th class=\"text\">figure</th>";
   for (const ComparedEstimate& estimate : comparison.estimates) {
     html += "<th>" + escape_markup(estimate.name) + "</th>";
   }
   html += "</tr></thead>\n<tbody>\n";
   for (const ComparedFigure& figure : figures_of(comparison)) {
     const std::string unit = figure.unit.empty() ? "" : ", " + figure.unit;
-    html += "<tr><td class=\"word\">" + escape_markup(figure.label + unit) + "</td>";
+    html += "<tr><td class=\"text\">" + escape_markup(figure.label + unit) + "</td>";
     for (std::size_t i = 0; i < figure.values.size(); ++i) {
       const std::string text = escape_markup(figure.text(i));
       html += figure.is_best(i) ? "<td class=\"better\"><b>" + text + "</b></td>"
@@ -108,7 +108,8 @@ std::string tracks_html(const Comparison& comparison) {
     }
   }
   const double unit = std::max(1.0, box.sizes().maxCoeff()) / 80;  // what a mark measures
-  box = {box.min() - Vec2::Constant(2 * unit), box.max() + Vec2::Constant(2 * unit)};
+  // The scale bar stands below.
+  box = {box.min() - Vec2(2 * unit, 5 * unit), box.max() + Vec2::Constant(2 * unit)};
   std::string svg = svg_format(
       "<svg id=\"path-map\" role=\"img\" aria-label=\"Tracks seen from above\" "
       "viewBox=\"%.3f %.3f %.3f %.3f\">\n",

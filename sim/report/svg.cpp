@@ -13,7 +13,7 @@ constexpr std::size_t kMostBuckets = 400;  // of a curve: each keeps its least a
 
 // A chart's drawing, in its own units: about as wide as a phone, so that its text is read there.
 constexpr double kWidth = 480, kHeight = 240;
-constexpr double kLeft = 52, kRight = 10, kTop = 10, kBottom = 38;
+constexpr double kLeft = 52, kRight = 16, kTop = 10, kBottom = 38;
 
 /// Round values from 0 on.
 struct Axis {

@@ -154,7 +154,11 @@ std::vector<ComparedFigure> figures_of(const Comparison& comparison) {
     add_one("RMSE", &Statistics::rmse);
     add_one("mean", &Statistics::mean);
     add_one("median", &Statistics::median);
+    add_one("standard deviation", &Statistics::std);
+    add_one("minimum", &Statistics::min);
     add_one("maximum", &Statistics::max);
+    add(label + ", sum of squares", unit + "²", false,
+        [&](const Evaluation& e) { return statistics_of_estimate(e).sse; });
   };
   add("matched poses", "", false, [](const Evaluation& e) { return e.pairs.size(); });
   add("duration", "s", false, [](const Evaluation& e) { return e.duration_s; });

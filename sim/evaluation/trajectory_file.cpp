@@ -17,6 +17,8 @@ namespace {
 // Two decimals a component, which is the coarsest that anybody writes, leave a norm that is off by
 // 0.01 at most: half a digit in each of four.
 constexpr double kRounding = 0.01;
+// What is beyond it counts as infinite: squares of squares of what is not are still numbers.
+constexpr double kInfinite = 1e60;
 // Nobody's clock counts so many seconds: they are nanoseconds.
 constexpr double kNoSeconds = 1e12;
 constexpr std::array<std::pair<TrajectoryFormat, std::string_view>, 3> kNames{
@@ -139,8 +141,7 @@ class Parser {
       refuse(std::to_string(row_.numbers.size()) + " numbers, expected " +
              (*format_ == TrajectoryFormat::kKitti ? "12" : "8") + " as before");
     }
-    const auto finite = [](double number) { return std::isfinite(number); };
-    if (!std::all_of(row_.numbers.begin(), row_.numbers.end(), finite)) {
+    if (!pose_is_finite()) {
       ++trajectory_.not_finite;
     } else if (*format_ == TrajectoryFormat::kKitti) {
       add_kitti_pose();
@@ -158,6 +159,15 @@ class Parser {
     format_ = asked_ && may_be(*asked_, columns) ? asked_ : tell_format(row_);
     if (!format_) refuse("may be TUM or EuRoC, expected --format tum or --format euroc");
     trajectory_.format = *format_;
+  }
+
+  // What follows the pose, EuRoC's velocities and biases, may be anything.
+  [[nodiscard]] bool pose_is_finite() const {
+    const bool kitti = *format_ == TrajectoryFormat::kKitti;
+    const auto end =
+        row_.numbers.begin() + static_cast<std::ptrdiff_t>(kitti ? kKittiColumns : kTumColumns);
+    return std::all_of(row_.numbers.begin(), end,
+                       [](double number) { return std::abs(number) < kInfinite; });
   }
 
   void add_stamped_pose() {

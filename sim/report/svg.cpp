@@ -18,7 +18,8 @@ constexpr double kLeft = 52, kRight = 16, kTop = 10, kBottom = 38;
 /// Round values from 0 on.
 struct Axis {
   double step = 1;
-  double end = 1;
+  int steps = 1;
+  [[nodiscard]] double end() const { return steps * step; }
 };
 
 Axis axis_to(double greatest, int most_steps) {
@@ -26,7 +27,7 @@ Axis axis_to(double greatest, int most_steps) {
   const double decade = std::pow(10, std::floor(std::log10(greatest / most_steps)));
   for (const double factor : {1., 2., 5., 10.}) {
     const double step = factor * decade;
-    if (greatest <= most_steps * step) return {step, step * std::ceil(greatest / step)};
+    if (greatest <= most_steps * step) return {step, static_cast<int>(std::ceil(greatest / step))};
   }
   return {};
 }
@@ -108,20 +109,20 @@ std::string chart_html(const std::string& title, const std::string& x_label,
   const Axis x = axis_to(greatest_of(curves, &Curve::x), 6);
   const Axis y = axis_to(greatest_of(curves, &Curve::y), 5);
   const auto across = [&](double value) {
-    return kLeft + value / x.end * (kWidth - kLeft - kRight);
+    return kLeft + value / x.end() * (kWidth - kLeft - kRight);
   };
   const auto up = [&](double value) {
-    return kHeight - kBottom - value / y.end * (kHeight - kBottom - kTop);
+    return kHeight - kBottom - value / y.end() * (kHeight - kBottom - kTop);
   };
   std::string svg =
       svg_format("<svg class=\"curves\" role=\"img\" viewBox=\"0 0 %g %g\" ", kWidth, kHeight) +
       "aria-label=\"" + escape_markup(title) + "\">\n";
-  for (int i = 0; i * x.step <= x.end * (1 + 1e-9); ++i) {
+  for (int i = 0; i <= x.steps; ++i) {
     const double at = across(i * x.step);
     svg += line(at, kTop, at, kHeight - kBottom);
     svg += label(at, kHeight - kBottom + 15, "middle", svg_format("%g", i * x.step));
   }
-  for (int i = 0; i * y.step <= y.end * (1 + 1e-9); ++i) {
+  for (int i = 0; i <= y.steps; ++i) {
     const double at = up(i * y.step);
     svg += line(kLeft, at, kWidth - kRight, at);
     svg += label(kLeft - 6, at + 4, "end", svg_format("%g", i * y.step));

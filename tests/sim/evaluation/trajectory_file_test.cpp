@@ -118,6 +118,16 @@ TEST(TrajectoryFile, CountsWhatItPutRight) {
   EXPECT_EQ(trajectory.poses[2].X.p.x(), 1) << "the later one of two stays behind the other";
 }
 
+TEST(TrajectoryFile, LeavesOutWhatADivergedFilterWrites) {
+  const Trajectory trajectory =
+      parse_trajectory("1 1e300 0 0 0 0 0 1\n2 -inf 0 0 0 0 0 1\n3 0 0 1e6 0 0 0 1\n", "f");
+  EXPECT_EQ(trajectory.not_finite, 2u);
+  EXPECT_EQ(trajectory.poses.size(), 1u);
+  // EuRoC's biases are none of the pose.
+  const Trajectory euroc = parse_trajectory("1500000000,1,2,3,1,0,0,0,nan,nan\n", "f");
+  EXPECT_EQ(euroc.not_finite, 0u);
+}
+
 TEST(TrajectoryFile, SaysWhatCannotBeRead) {
   const test::TemporaryFolder folder;
   const std::string missing = (folder / "none.tum").string();

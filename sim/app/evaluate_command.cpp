@@ -119,6 +119,7 @@ int evaluate(const EvaluateArguments& arguments) {
     }
   }
   std::vector<sim::Trajectory> estimates;
+  estimates.reserve(files.size());
   for (const std::string& file : files) estimates.push_back(sim::read_trajectory(file, format));
   const sim::Comparison comparison = sim::compare(
       sim::read_trajectory(reference_file(truth), format), std::move(estimates), options);

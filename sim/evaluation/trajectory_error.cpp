@@ -114,7 +114,7 @@ RelativeError relative_error_over(const std::vector<PosePair>& pairs,
 }
 
 std::string span_text(const Trajectory& trajectory) {
-  return fmt::format("{:.9g} to {:.9g} s", trajectory.poses.front().time_s,
+  return fmt::format("{:.13g} to {:.13g} s", trajectory.poses.front().time_s,
                      trajectory.poses.back().time_s);
 }
 

@@ -241,7 +241,7 @@ Trajectory read_trajectory(const std::filesystem::path& file,
   }
   std::ostringstream text;
   text << stream.rdbuf();
-  return parse_trajectory(text.view(), file.string(), format);
+  return parse_trajectory(text.view(), printable(file.string()), format);
 }
 
 Trajectory parse_trajectory(std::string_view text, const std::string& name,

@@ -25,7 +25,7 @@ std::optional<TrajectoryFormat> format_named(std::string_view name);
 
 /// A trajectory as another program left it, and what was done to its lines.
 struct Trajectory {
-  std::string file;
+  std::string file;  ///< its name, printable
   TrajectoryFormat format = TrajectoryFormat::kTum;
   std::vector<TimedPose> poses;  ///< in order of time; of KITTI in the file's, without times
 

@@ -142,6 +142,9 @@ TEST(TrajectoryFile, SaysWhatCannotBeRead) {
   const Trajectory read = read_trajectory(folder / "a.tum");
   EXPECT_EQ(read.file, (folder / "a.tum").string());
   expect_the_pose(read, Format::kTum);
+  // A name that JSON cannot hold.
+  test::write_text(folder / "\xff.tum", kTum);
+  EXPECT_EQ(read_trajectory(folder / "\xff.tum").file, (folder / "\\xff.tum").string());
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "report/payload.h"
+#include "report/svg.h"
 #include "report/targets.h"
 
 namespace arex::sim {
@@ -120,20 +121,13 @@ Backdrop backdrop_of(const std::vector<Vec3f>& points_O) {
   return backdrop;
 }
 
-template <typename... Numbers>
-std::string format(const char* pattern, Numbers... numbers) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, numbers...);
-  return text.data();
-}
-
 std::string points_text(const std::vector<TimedPose>& poses, std::size_t most) {
   std::string points;
   const std::size_t step = poses.size() / most + 1;
   for (std::size_t i = 0; i < poses.size(); i += step) {
-    points += format("%.2f,%.2f ", poses[i].X.p.x(), -poses[i].X.p.y());
+    points += svg_format("%.2f,%.2f ", poses[i].X.p.x(), -poses[i].X.p.y());
   }
-  return points + format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
+  return points + svg_format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
 }
 
 std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
@@ -143,7 +137,8 @@ std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
 }
 
 std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
-  return format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius, name) +
+  return svg_format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius,
+                    name) +
          "<title>" + escape_markup(title) + "</title></circle>\n";
 }
 
@@ -158,26 +153,11 @@ std::string candidates_svg(const Table& decisions, double radius) {
     if (!std::isfinite(x[i]) || !std::isfinite(y[i]) || decisions.text(i, "verdict") != "kept") {
       continue;
     }
-    path += format("M%.1f %.1fh0", x[i], -y[i]);
+    path += svg_format("M%.1f %.1fh0", x[i], -y[i]);
   }
   if (path.empty()) return {};
-  return format("<path class=\"candidates\" stroke-width=\"%.2f\" d=\"", 1.2 * radius) + path +
+  return svg_format("<path class=\"candidates\" stroke-width=\"%.2f\" d=\"", 1.2 * radius) + path +
          "\"/>\n";
-}
-
-// A bar of a round length in the lower left corner.
-std::string scale_bar(const Eigen::AlignedBox2d& box, double unit) {
-  const double width = box.sizes().x();
-  double length = 1;
-  for (const double candidate : {2., 5., 10., 20., 50., 100., 200., 500.}) {
-    if (candidate < 0.3 * width) length = candidate;
-  }
-  const double x = box.min().x() + 1.5 * unit;
-  const double y = -box.min().y() - 1.5 * unit;
-  return format("<path class=\"scale\" d=\"M%.2f %.2fv%.2fh%.2fv%.2f\"/>", x, y - 0.6 * unit,
-                0.6 * unit, length, -0.6 * unit) +
-         format("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\">%g m</text>\n", x + 0.4 * unit,
-                y - 0.5 * unit, 1.6 * unit, length);
 }
 
 /// What a picture shows of the plane, with a rim of one mark's size.
@@ -202,11 +182,12 @@ View view_of(Eigen::AlignedBox2d box, const Backdrop& backdrop) {
 std::string open_svg(const View& view, const Backdrop& backdrop, const char* attributes) {
   const Eigen::AlignedBox2d& box = view.box;
   std::string svg =
-      format("<svg class=\"map\" role=\"img\" viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\" ",
-             box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), view.unit) +
+      svg_format(
+          "<svg class=\"map\" role=\"img\" viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\" ",
+          box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), view.unit) +
       attributes + ">\n";
   if (backdrop.width > 0) {
-    svg += format(
+    svg += svg_format(
                "<image x=\"%.3f\" y=\"%.3f\" width=\"%.3f\" height=\"%.3f\" "
                "preserveAspectRatio=\"none\" href=\"",
                backdrop.x_m, -backdrop.y_m, backdrop.width * backdrop.cell_m,
@@ -245,18 +226,12 @@ std::string map_picture_svg(const RunRecord& run) {
     svg +=
         circle(target.p_O.x(), target.p_O.y(), 0.55 * unit, target.reached ? "reached" : "target",
                "target " + std::to_string(i + 1) + ", selected at " +
-                   format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
+                   svg_format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
   }
   if (!run.truth.empty()) {
-    const Vec3& start = run.truth.front().X.p;
-    const Vec3& end = run.truth.back().X.p;
-    svg += circle(start.x(), start.y(), 0.9 * unit, "start", "start");
-    svg += format("<path class=\"end\" d=\"M%.2f %.2fl%.2f %.2fm0 %.2fl%.2f %.2f\">",
-                  end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit, -1.6 * unit,
-                  -1.6 * unit, 1.6 * unit) +
-           "<title>end</title></path>\n";
+    svg += svg_ends(run.truth.front().X.p.head<2>(), run.truth.back().X.p.head<2>(), unit);
   }
-  return svg + scale_bar(view.box, unit) + "</svg>\n";
+  return svg + svg_scale_bar(view.box, unit) + "</svg>\n";
 }
 
 std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<DrawnPath>& paths) {
@@ -275,13 +250,13 @@ std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<
     svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
            points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
     const Vec3& end = poses->back().X.p;
-    ends += format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" style=\"fill:", end.x(), -end.y(),
-                   0.6 * view.unit) +
+    ends += svg_format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" style=\"fill:", end.x(),
+                       -end.y(), 0.6 * view.unit) +
             colour + "\">" + name + "</circle>\n";
   }
   const Vec3& start = paths.front().poses->front().X.p;
   svg += ends + circle(start.x(), start.y(), 0.9 * view.unit, "start", "start");
-  return svg + scale_bar(view.box, view.unit) + "</svg>\n";
+  return svg + svg_scale_bar(view.box, view.unit) + "</svg>\n";
 }
 
 }  // namespace arex::sim

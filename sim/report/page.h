@@ -11,6 +11,9 @@ namespace arex::sim {
 std::string report_page(const std::string& title, const std::string& main,
                         const nlohmann::ordered_json& payload);
 
+/// The same of a page that needs no script.
+std::string report_page(const std::string& title, const std::string& main);
+
 /// One figure of the summary at the top.
 struct KeyFigure {
   std::string label;

@@ -262,12 +262,29 @@ async function testHypercube(browser) {
   await page.close();
 }
 
+/** Trajectories compared: a page that needs no script, on a phone and on paper. */
+async function testEvaluation(browser, width, dark) {
+  const page = await browser.open(address('evaluation'), { width, dark, script: false });
+  const shown = `[...document.querySelectorAll('#path-map polyline, .curves polyline, td')]
+    .every((e) => e.getBoundingClientRect().width > 0)`;
+  assert.ok(await page.run(shown), 'something is not to be seen');
+  assert.equal(await page.run(`document.querySelectorAll('.curves').length`), 6);
+  assert.match(await page.run('document.body.innerText'), /position error \(ATE\), RMSE, m\s+[\d.]+\s+0\s/);
+  const letters = await page.run(`document.querySelector('.curves text').getBoundingClientRect().height`);
+  assert.ok(letters > 9, `the charts' text is ${letters} pixels high`);
+  await keep(page, `evaluation-${width}-${dark ? 'dark' : 'light'}`);
+  assert.ok((await page.pdf()).length > 10_000);
+  await assertSound(page, width);
+  await page.close();
+}
+
 const browser = new Browser(chromium);
 try {
   execFileSync(fixture, [folder]);
   for (const [width, dark] of [[1280, false], [400, true]]) {
     await testRun(browser, width, dark);
     await testSweep(browser, width, dark);
+    await testEvaluation(browser, width, dark);
   }
   await testFailures(browser);
   await testHypercube(browser);
@@ -277,7 +294,7 @@ try {
   await testWithoutScript(browser);
   await testPaper(browser);
   await testOverlay(browser);
-  console.log('12 passed, 0 failed');
+  console.log('14 passed, 0 failed');
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

@@ -68,19 +68,18 @@ std::string title_of(const sim::PlannedRun& run, const sim::SweepPlan& plan) {
   return plan.repeats > 1 ? title + fmt::format(" repeat {}", run.repeat) : title;
 }
 
-// "2 in flight (forest seed 3 at 84 s, forest seed 4 at 12 s)"
+// "forest seed 3 at 84 s, forest seed 4 starting"; a run that has no folder yet is not among them.
 std::string in_flight(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
-  const std::vector<std::string> ids = folder.partials();
   std::string text;
-  for (const std::string& id : ids) {
+  for (const std::string& id : folder.partials()) {
     const auto run = std::find_if(plan.runs.begin(), plan.runs.end(),
                                   [&](const sim::PlannedRun& planned) { return planned.id == id; });
     if (run == plan.runs.end()) continue;
     const double time_s = flown_s(folder.root() / sim::SweepFolder::partial(id));
-    text += (text.empty() ? " (" : ", ") + title_of(*run, plan);
+    text += (text.empty() ? "" : ", ") + title_of(*run, plan);
     text += time_s < 0 ? " starting" : fmt::format(" at {:.0f} s", time_s);
   }
-  return fmt::format("{} in flight{}", ids.size(), text.empty() ? "" : text + ")");
+  return text;
 }
 
 /// The line that a person watches, and a line of its own for every run that breaks.
@@ -112,7 +111,7 @@ class SweepLine {
         fmt::format("{}/{} done, {} missions failed, {} broken, {}, ETA {}", done_ + p.finished,
                     total_, p.missions_failed, p.broken, clock_text(p.elapsed_s),
                     p.left_s < 0 ? "?" : clock_text(p.left_s));
-    if (p.running > 0) line += ", " + in_flight();
+    if (p.running > 0) line += fmt::format(", {} in flight: {}", p.running, in_flight());
     if (on_terminal_) line = "\r\033[K" + cut(line);
     std::fputs(line.c_str(), stderr);
     if (!on_terminal_) std::fputc('\n', stderr);

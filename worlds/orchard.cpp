@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "worlds/level_ground.h"
 #include "worlds/mesh_builder.h"
 #include "worlds/reflectivity.h"
 #include "worlds/sampling.h"
@@ -17,17 +18,6 @@ constexpr ReflectivityBand kWireReflectivity{0.35, 0.55};  ///< galvanised steel
 constexpr double kOffRow = 0.04;  // standard deviation of a trunk's place, across and along, m
 constexpr int kPostSides = 10;
 constexpr int kWireSides = 3;
-
-HeightField level_ground(const Vec2& size) {
-  HeightField field;
-  field.spacing_m = 1;
-  field.columns = static_cast<int>(std::ceil(size.x() - 1e-9)) + 1;
-  field.rows = static_cast<int>(std::ceil(size.y() - 1e-9)) + 1;
-  field.origin = -0.5 * Vec2(field.columns - 1, field.rows - 1);
-  field.height_m.assign(
-      static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows), 0.0F);
-  return field;
-}
 
 void add_trellis(MeshBuilder& builder, const OrchardRecipe& recipe, double y,
                  RandomStream& random) {
@@ -72,7 +62,7 @@ double OrchardRecipe::expected_triangles() const {
 World build(const OrchardRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream ground_stream(seed, "worlds/orchard/ground");
-  const HeightField terrain = level_ground(recipe.size_m);
+  const HeightField terrain = level_ground(-0.5 * recipe.size_m, 0.5 * recipe.size_m);
   builder.add_height_field(
       builder.add_object(SurfaceClass::kGround, kForestFloorReflectivity.draw(ground_stream)),
       terrain);

@@ -136,7 +136,8 @@ StateTree GlobalMap::octree() const {
     for (at.x() = 0; at.x() < brick_count_.x(); ++at.x()) {
       for (at.z() = 0; at.z() < brick_count_.z(); ++at.z(), ++slot) {
         const std::unique_ptr<Brick>& brick = bricks_[slot];
-        if (brick) all.push_back({brick_low_ + at, &brick->known, &brick->occupied, brick->known});
+        if (!brick || brick->known == BrickMask{}) continue;
+        all.push_back({brick_low_ + at, &brick->known, &brick->occupied, brick->known});
       }
     }
   }

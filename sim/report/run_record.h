@@ -7,18 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "math/pose.h"
+#include "evaluation/timed_pose.h"
 #include "report/table.h"
 
 /// Reading run folders back. A killed run leaves some files short and others out: what is there is
 /// read, what is not is named.
 namespace arex::sim {
-
-/// A pose of a recorded track, in the frames that the track names.
-struct TimedPose {
-  double time_s = 0;
-  Pose X;
-};
 
 /// A TUM file. A last line cut short by a kill is left out; empty if the file is missing.
 std::vector<TimedPose> read_tum(const std::filesystem::path& file);

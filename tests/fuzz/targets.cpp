@@ -5,9 +5,11 @@
 #include <stdexcept>
 
 #include "config/config.h"
+#include "evaluation/comparison.h"
 #include "fuzz/corpus.h"
 #include "fuzz/mutation.h"
 #include "report/comparison_report.h"
+#include "report/evaluation_report.h"
 #include "report/page.h"
 #include "report/result_table.h"
 #include "report/run_record.h"
@@ -81,6 +83,26 @@ void read_flight(const fs::path& folder, RandomStream& random) {
   sim::load_scenario(folder / "resolved.yaml", {}, {});
 }
 
+// Somebody's trajectory, in each of the formats, against a whole one.
+void compare_trajectories(const fs::path& folder, RandomStream& random) {
+  std::string tum, euroc, kitti;
+  for (int i = 0; i < 12; ++i) {
+    const std::string x = std::to_string(i), y = std::to_string(i * i % 7);
+    tum += x + " " + x + " " + y + " 1 0 0 0 1\n";
+    euroc += x + "000000000," + x + "," + y + ",1,1,0,0,0,0.1,0.1,0.1\n";
+    kitti += "1 0 0 " + x + " 0 1 0 " + y + " 0 0 1 1\n";
+  }
+  const bool stamped = random.uniform() < 0.7;
+  const std::string& whole = stamped ? random.uniform() < 0.5 ? tum : euroc : kitti;
+  const std::string damaged = damage_bytes(whole, {tum, euroc, kitti, "nan", "1e59", "-0"}, random);
+  write_text(folder / "estimate.txt", damaged);
+  sim::EvaluationOptions options;
+  options.alignment = static_cast<sim::Alignment>(random.uniform_int(0, 5));
+  static_cast<void>(sim::evaluation_report_html(
+      sim::compare(sim::parse_trajectory(stamped ? tum : kitti, "truth"),
+                   {sim::read_trajectory(folder / "estimate.txt")}, options)));
+}
+
 void report_sweep(const fs::path& folder, RandomStream& random) {
   write_files(recorded_sweep(), folder);
   damage_files(recorded_sweep(), folder, random);
@@ -136,6 +158,7 @@ std::vector<Target> all_targets() {
           {"run report", report_run},
           {"overrides, too", read_overrides},
           {"flight", read_flight},
+          {"trajectories", compare_trajectories},
           {"sweep report", report_sweep},
           {"requirement", read_requirement},
           {"batch", read_batch},

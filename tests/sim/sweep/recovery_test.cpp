@@ -60,6 +60,7 @@ class SweepRecovery : public ::testing::Test {
     write_text(file(), test::short_sweep());
     const ProcessResult result = arex(sweep_arguments(file(), undisturbed()));
     ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.err.find(" in flight: "), std::string::npos) << result.err;
     ASSERT_EQ(lines_of(undisturbed() / "sweep.csv").size(), std::size_t{kShortRuns + 1});
   }
   static void TearDownTestSuite() { delete shared_; }

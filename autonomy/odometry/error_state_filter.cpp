@@ -58,7 +58,7 @@ void ErrorStateFilter::predict(const ImuInterval& imu) {
   const double dt = imu.dt_s();
   const PropagationJacobians jacobians = propagation_jacobians(x_, imu);
   Eigen::Matrix<double, kNoiseDim, 1> Q;
-  const Vec3 rate = imu.mean_gyro() - x_.b_g;
+  const Vec3 rate = x_.rate(imu.mean_gyro());
   for (int i = 0; i < 3; ++i) {
     const double gyro =
         imu.gyro_clipped[static_cast<std::size_t>(i)]
@@ -73,6 +73,7 @@ void ErrorStateFilter::predict(const ImuInterval& imu) {
   const NoiseJacobian GQ = jacobians.G * Q.asDiagonal();
   P_.noalias() = FP * jacobians.F.transpose();
   P_.noalias() += GQ * jacobians.G.transpose();
+  P_(kTimeOffset, kTimeOffset) += noise_.delay_walk_density * noise_.delay_walk_density * dt;
   P_ = (0.5 * (P_ + P_.transpose())).eval();
   x_ = propagate(x_, imu);
 }

@@ -12,14 +12,12 @@ LidarInertialOdometry::LidarInertialOdometry(const LidarInertialConfig& config, 
                                              double body_radius_m)
     : health_(config.health),
       corrector_(config, X_BL, body_radius_m),
-      imu_delay_(from_seconds(config.imu.delay_s)),
       full_scale_(config.imu.gyro_range_radps) {}
 
 Odometry LidarInertialOdometry::add_imu(const ImuSample& imu) {
   newest_ = imu;
   full_scale_.add(imu.gyro_radps);
   unhanded_.push_back(imu);
-  unhanded_.back().stamp -= imu_delay_;
   predictor_.add(unhanded_.back());
   publish();
   return odometry_;
@@ -62,7 +60,7 @@ void LidarInertialOdometry::publish() {
   if (!state) return;
   odometry_.X_OB = state->X_OB();
   odometry_.v_OB = state->v_OB;
-  odometry_.w_OB_B = newest_.gyro_radps - state->b_g;
+  odometry_.w_OB_B = state->rate(newest_.gyro_radps);
   const double silence_s = to_seconds(newest_.stamp - odometry_.correction_stamp);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;

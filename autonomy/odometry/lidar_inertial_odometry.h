@@ -56,7 +56,6 @@ class LidarInertialOdometry {
   OdometryHealthConfig health_;
   ScanCorrector corrector_;
   ImuPredictor predictor_;
-  Stamp imu_delay_;
   GyroFullScale full_scale_;
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;

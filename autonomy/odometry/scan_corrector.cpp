@@ -9,6 +9,9 @@
 namespace arex {
 namespace {
 
+/// Over so long the shaking of the IMU is measured.
+constexpr Stamp kShakenFor = kNanosecondsPerSecond;
+
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
   std::vector<float> fractions;
   fractions.reserve(points.size());
@@ -83,7 +86,7 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   }
   status_ = OdometryStatus::kOk;
   standing_scans_.clear();
-  imu_.forget_before(stamp_);
+  imu_.forget_before(stamp_ - kShakenFor);
 }
 
 bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
@@ -129,6 +132,8 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   // A clipped gyro bends the scan. What the scan then says of the missing rate unbends it.
   constexpr int kPasses = 4;
   constexpr double kSettled = 0.02;  // rad/s
+  filter_.set_noise(
+      shaken_by(config_.imu, white_noise(imu_.between(scan.end - kShakenFor, scan.end))));
   const ErrorStateFilter before = filter_;
   for (int pass = 1;; ++pass) {
     ClippedTime clipped;
@@ -152,7 +157,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     gyro_.missing_radps = missing;
     if (!clipped.any() || change < kSettled || pass == kPasses) {
       stamp_ = scan.end;
-      imu_.forget_before(stamp_);
+      imu_.forget_before(stamp_ - kShakenFor);
       return points;
     }
     filter_ = before;
@@ -162,7 +167,8 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
 std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (ImuInterval& imu : imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_)) {
+  for (ImuInterval& imu : imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_,
+                                        filter_.state().t_d)) {
     gyro_.complete(imu);
     clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));

@@ -8,7 +8,8 @@
 namespace arex {
 namespace {
 
-ErrorMatrix prior_covariance(const StaticInitialiserConfig& sc) {
+ErrorMatrix prior_covariance(const LidarInertialConfig& config) {
+  const StaticInitialiserConfig& sc = config.initialiser;
   // Gravity before it is measured.
   constexpr double kGravityPriorStd = 10.0;
   ErrorMatrix P = ErrorMatrix::Zero();
@@ -21,6 +22,8 @@ ErrorMatrix prior_covariance(const StaticInitialiserConfig& sc) {
   set(kGyroBias, sc.gyro_bias_std_radps);
   set(kAccelBias, sc.accel_bias_std_mps2);
   set(kGravityBlock, kGravityPriorStd);
+  set(kGyroScale, config.imu.gyro_scale_std);
+  P(kTimeOffset, kTimeOffset) = config.imu.delay_std_s * config.imu.delay_std_s;
   return P;
 }
 
@@ -61,8 +64,9 @@ std::optional<StaticStart> start_from_standstill(std::span<const ImuSample> samp
   x.R_OB = level(f_B);
   x.b_g = m.gyro_mean;
   x.X_BL = X_BL;
+  x.t_d = config.imu.delay_s;
   ErrorStateFilter filter(config.imu);
-  ErrorMatrix P = prior_covariance(sc);
+  ErrorMatrix P = prior_covariance(config);
   const double mean_share = 1 / static_cast<double>(standing->samples);
   P.diagonal().segment<3>(kGyroBias).array() += m.gyro_std * m.gyro_std * mean_share;
   filter.reset(x, P);

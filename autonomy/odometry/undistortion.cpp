@@ -43,7 +43,7 @@ MotionSegment motion_segment(const NavigationState& x, const ImuInterval& imu) {
   segment.end = imu.end;
   segment.X_OB = x.X_OB();
   segment.v_OB = x.v_OB;
-  segment.w_OB_B = imu.mean_gyro() - x.b_g;
+  segment.w_OB_B = x.rate(imu.mean_gyro());
   segment.a_OB = (y.v_OB - x.v_OB) / imu.dt_s();
   return segment;
 }

@@ -6,6 +6,8 @@ namespace arex {
 namespace {
 // An anchor older than this many samples (10 s) is not integrated from its own time on.
 constexpr std::size_t kMaxSamples = 2000;
+// By so much at most the readings lie ahead of their stamps.
+constexpr Stamp kMostAhead = kNanosecondsPerSecond / 5;
 }  // namespace
 
 void ImuPredictor::add(const ImuSample& imu) {
@@ -13,19 +15,19 @@ void ImuPredictor::add(const ImuSample& imu) {
     samples_.erase(samples_.begin(), samples_.begin() + kMaxSamples / 2);
   }
   samples_.push_back(imu);
-  advance(imu.stamp);
+  advance();
 }
 
 void ImuPredictor::anchor(Stamp stamp, const NavigationState& state, double accel_scale,
                           const GyroCompletion& completion) {
-  const auto after = std::upper_bound(samples_.begin(), samples_.end(), stamp,
+  const auto after = std::upper_bound(samples_.begin(), samples_.end(), stamp - kMostAhead,
                                       [](Stamp t, const ImuSample& s) { return t < s.stamp; });
   if (after != samples_.begin()) samples_.erase(samples_.begin(), after - 1);
   head_ = state;
   head_stamp_ = stamp;
   accel_scale_ = accel_scale;
   completion_ = completion;
-  if (!samples_.empty()) advance(samples_.back().stamp);
+  advance();
 }
 
 std::optional<NavigationState> ImuPredictor::at(Stamp stamp) const {
@@ -33,18 +35,19 @@ std::optional<NavigationState> ImuPredictor::at(Stamp stamp) const {
   return integrate(stamp);
 }
 
-void ImuPredictor::advance(Stamp to) {
-  if (!head_ || to <= head_stamp_) return;
+void ImuPredictor::advance() {
+  if (!head_ || samples_.empty()) return;
+  // Not to where the newest reading would have to be held, which the next one is better for; nor
+  // further than is asked for.
+  const Stamp to = samples_.back().stamp - std::max<Stamp>(0, from_seconds(head_->t_d));
+  if (to <= head_stamp_) return;
   head_ = integrate(to);
   head_stamp_ = to;
 }
 
 NavigationState ImuPredictor::integrate(Stamp to) const {
-  const auto after = std::upper_bound(samples_.begin(), samples_.end(), head_stamp_,
-                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  const auto first = after == samples_.begin() ? after : after - 1;
   NavigationState state = *head_;
-  for (ImuInterval& imu : imu_intervals({first, samples_.end()}, head_stamp_, to, accel_scale_)) {
+  for (ImuInterval& imu : imu_intervals(samples_, head_stamp_, to, accel_scale_, head_->t_d)) {
     completion_.complete(imu);
     state = propagate(state, imu);
   }

@@ -24,7 +24,7 @@ class ImuPredictor {
   [[nodiscard]] std::optional<NavigationState> at(Stamp stamp) const;
 
  private:
-  void advance(Stamp to);
+  void advance();
   [[nodiscard]] NavigationState integrate(Stamp to) const;
 
   std::vector<ImuSample> samples_;  ///< from one at or before the anchor on

@@ -7,6 +7,9 @@ namespace arex {
 /// What an odometry believes of its IMU.
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
+  double delay_std_s = 0.03;                ///< 1 sigma of that before take-off
+  double delay_walk_density = 1e-5;         ///< s/sqrt(s)
+  double gyro_scale_std = 0.02;             ///< 1 sigma of the scale's error before take-off
   double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
   double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
   double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
@@ -18,7 +21,13 @@ struct ImuNoiseConfig {
   void fields(auto& f) {
     f("delay_s", delay_s,
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
-      "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
+      "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added. Estimated from there on");
+    f("delay_std_s", delay_std_s,
+      "1 sigma of the delay before take-off: clocks that nobody synchronised; 0 takes it as known");
+    f("delay_walk_density", delay_walk_density, "s/sqrt(s), walk of the delay");
+    f("gyro_scale_std", gyro_scale_std,
+      "1 sigma of the gyro's scale error before take-off (ICM-42688-P: 0.5 %; its mounting and "
+      "worse devices more); 0 takes the scale as known");
     f("gyro_noise_density", gyro_noise_density,
       "rad/s/sqrt(Hz): half as much again as the white noise of the sensor, 1e-4, for aliased "
       "vibration; more lets scans of a small scene tilt a vehicle that stands still. A "
@@ -36,6 +45,9 @@ struct ImuNoiseConfig {
     f.check(delay_s > -0.1 && delay_s < 0.1, "-0.1 < delay_s < 0.1");
     f.check(gyro_noise_density > 0 && accel_noise_density > 0,
             "gyro_noise_density > 0, accel_noise_density > 0");
+    f.check(delay_std_s >= 0 && delay_std_s <= 0.2, "0 <= delay_std_s <= 0.2");
+    f.check(delay_walk_density >= 0 && gyro_scale_std >= 0 && gyro_scale_std <= 0.5,
+            "delay_walk_density >= 0, 0 <= gyro_scale_std <= 0.5");
     f.check(gyro_walk_density >= 0 && accel_walk_density >= 0,
             "gyro_walk_density >= 0, accel_walk_density >= 0");
   }

@@ -16,6 +16,8 @@ NavigationState retract(const NavigationState& x, const ErrorVector& d) {
   y.g_O = x.g_O + d.segment<3>(kGravityBlock);
   y.X_BL.R = x.X_BL.R * so3::Exp(d.segment<3>(kExtrinsicRotation));
   y.X_BL.p = x.X_BL.p + d.segment<3>(kExtrinsicPosition);
+  y.s_g = x.s_g + d.segment<3>(kGyroScale);
+  y.t_d = x.t_d + d[kTimeOffset];
   return y;
 }
 
@@ -29,6 +31,8 @@ ErrorVector local(const NavigationState& x, const NavigationState& y) {
   d.segment<3>(kGravityBlock) = y.g_O - x.g_O;
   d.segment<3>(kExtrinsicRotation) = so3::Log(x.X_BL.R.transpose() * y.X_BL.R);
   d.segment<3>(kExtrinsicPosition) = y.X_BL.p - x.X_BL.p;
+  d.segment<3>(kGyroScale) = y.s_g - x.s_g;
+  d[kTimeOffset] = y.t_d - x.t_d;
   return d;
 }
 
@@ -73,9 +77,12 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
 }  // namespace
 
 std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp from, Stamp to,
-                                       double accel_scale) {
+                                       double accel_scale, double delay_s) {
   std::vector<ImuInterval> intervals;
   if (to <= from) return intervals;
+  const Stamp delay = from_seconds(delay_s);
+  from += delay;
+  to += delay;
   ImuInterval interval;
   interval.begin = from;
   read_imu(samples, from, accel_scale, interval.gyro_begin, interval.accel_begin);
@@ -90,13 +97,17 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
     interval.accel_begin = interval.accel_end;
     if (next != samples.end()) ++next;
   }
+  for (ImuInterval& covered : intervals) {
+    covered.begin -= delay;
+    covered.end -= delay;
+  }
   return intervals;
 }
 
 NavigationState propagate(const NavigationState& x, const ImuInterval& imu) {
   const double dt = imu.dt_s();
   NavigationState y = x;
-  y.R_OB = x.R_OB * so3::Exp((imu.mean_gyro() - x.b_g) * dt);       // eq. (7)
+  y.R_OB = x.R_OB * so3::Exp(x.rate(imu.mean_gyro()) * dt);         // eq. (7)
   const Vec3 a_begin = x.R_OB * (imu.accel_begin - x.b_a) + x.g_O;  // eq. (6)
   const Vec3 a_end = y.R_OB * (imu.accel_end - x.b_a) + x.g_O;
   const Vec3 a = 0.5 * (a_begin + a_end);             // eq. (8)
@@ -107,7 +118,7 @@ NavigationState propagate(const NavigationState& x, const ImuInterval& imu) {
 
 PropagationJacobians propagation_jacobians(const NavigationState& x, const ImuInterval& imu) {
   const double dt = imu.dt_s();
-  const Vec3 phi = (imu.mean_gyro() - x.b_g) * dt;
+  const Vec3 phi = x.rate(imu.mean_gyro()) * dt;
   const Mat3 turn = so3::Exp(-phi);
   const Mat3 A_T_dt = so3::right_jacobian(phi) * dt;  // the paper's A(phi)^T dt
   const Mat3 R_end = x.R_OB * turn.transpose();
@@ -116,17 +127,30 @@ PropagationJacobians propagation_jacobians(const NavigationState& x, const ImuIn
 
   // How the interval's mean acceleration answers to each error.
   const Mat3 a_by_rotation = -0.5 * (lever_begin + lever_end * turn);
-  const Mat3 a_by_gyro_bias = 0.5 * lever_end * A_T_dt;
+  const Mat3 a_by_turn = -0.5 * lever_end;  // of the attitude at the end
   const Mat3 a_by_accel_bias = -0.5 * (x.R_OB + R_end);
+
+  // How the turn answers to the gyro's errors. A later reading is another one by its slope.
+  const Vec3 scale = Vec3::Ones() + x.s_g;
+  const Mat3 turn_by_gyro_bias = -A_T_dt * scale.asDiagonal();
+  const Mat3 turn_by_gyro_scale = A_T_dt * (imu.mean_gyro() - x.b_g).asDiagonal();
+  const Vec3 turn_by_time =
+      A_T_dt * scale.cwiseProduct(imu.gyro_end - imu.gyro_begin) / dt;
+  const Vec3 a_by_time =
+      a_by_turn * turn_by_time - a_by_accel_bias * (imu.accel_end - imu.accel_begin) / dt;
 
   PropagationJacobians out;
   ErrorMatrix& F = out.F;
   F.setIdentity();
   F.block<3, 3>(kRotation, kRotation) = turn;
-  F.block<3, 3>(kRotation, kGyroBias) = -A_T_dt;
+  F.block<3, 3>(kRotation, kGyroBias) = turn_by_gyro_bias;
+  F.block<3, 3>(kRotation, kGyroScale) = turn_by_gyro_scale;
+  F.block<3, 1>(kRotation, kTimeOffset) = turn_by_time;
   const auto add_acceleration = [&](int row, double factor) {
     F.block<3, 3>(row, kRotation) = factor * a_by_rotation;
-    F.block<3, 3>(row, kGyroBias) = factor * a_by_gyro_bias;
+    F.block<3, 3>(row, kGyroBias) = factor * a_by_turn * turn_by_gyro_bias;
+    F.block<3, 3>(row, kGyroScale) = factor * a_by_turn * turn_by_gyro_scale;
+    F.block<3, 1>(row, kTimeOffset) = factor * a_by_time;
     F.block<3, 3>(row, kAccelBias) = factor * a_by_accel_bias;
     F.block<3, 3>(row, kGravityBlock) = factor * Mat3::Identity();
   };

@@ -11,9 +11,10 @@
 
 /// The state of the LiDAR-inertial filter, its error and its motion model.
 ///
-/// Error state, 24x1: [R_OB, p_OB, v_OB, b_g, b_a, g_O | R_BL, p_BL], rotation errors on the right
-/// (R <- R Exp(d)). The last six are the optional online extrinsics; with zero covariance they stay
-/// where they are. Source: Xu and Zhang, FAST-LIO, RA-L 2021; AREX paper, eqs. (2)-(3), (6)-(9).
+/// Error state, 28x1: [R_OB, p_OB, v_OB, b_g, b_a, g_O | R_BL, p_BL | s_g, t_d], rotation errors on
+/// the right (R <- R Exp(d)). What follows the first bar are the optional online extrinsics and the
+/// IMU's intrinsics; with zero covariance they stay where they are. Sources: Xu and Zhang, FAST-LIO,
+/// RA-L 2021; AREX paper, eqs. (2)-(3), (6)-(9); t_d as Qin and Shen, IROS 2018, estimate it.
 namespace arex {
 
 struct NavigationState {
@@ -24,11 +25,17 @@ struct NavigationState {
   Vec3 b_a = Vec3::Zero();           ///< accelerometer bias, m/s^2, in B
   Vec3 g_O = Vec3(0, 0, -kGravity);  ///< gravity, m/s^2, in O
   Pose X_BL;                         ///< LiDAR in B
+  Vec3 s_g = Vec3::Zero();           ///< the rate is (1 + s_g) times the unbiased reading, per axis
+  double t_d = 0;                    ///< s that the IMU's readings lie behind their stamps
 
   [[nodiscard]] Pose X_OB() const { return {R_OB, p_OB}; }
+  /// The body's rate that a reading of the gyro means, rad/s.
+  [[nodiscard]] Vec3 rate(const Vec3& gyro) const {
+    return (gyro - b_g).cwiseProduct(Vec3::Ones() + s_g);
+  }
 };
 
-inline constexpr int kErrorDim = 24;
+inline constexpr int kErrorDim = 28;
 inline constexpr int kNoiseDim = 12;
 /// First index of each block of the error state.
 enum ErrorBlock : int {
@@ -40,6 +47,8 @@ enum ErrorBlock : int {
   kGravityBlock = 15,
   kExtrinsicRotation = 18,
   kExtrinsicPosition = 21,
+  kGyroScale = 24,
+  kTimeOffset = 27,
 };
 
 using ErrorVector = Eigen::Matrix<double, kErrorDim, 1>;
@@ -70,9 +79,10 @@ struct ImuInterval {
 /// The intervals between the samples that cover [from, to], the first and the last cut to fit.
 /// Readings are interpolated; beyond the first and the last sample they are held. Specific force is
 /// multiplied by `accel_scale`.
+/// @param delay_s that the readings lie behind their stamps
 /// @pre samples are in order of time and not empty.
 std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp from, Stamp to,
-                                       double accel_scale);
+                                       double accel_scale, double delay_s = 0);
 
 /// Integrates one interval by the midpoint (paper, eqs. (6)-(9)).
 NavigationState propagate(const NavigationState& x, const ImuInterval& imu);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "math/so3.h"
 
@@ -44,19 +45,25 @@ Mat3 level(const Vec3& f_B) {
 WhiteNoise white_noise(std::span<const ImuSample> samples) {
   constexpr std::size_t kBlock = 5;  // 25 ms at 200 Hz: some time constants of the filters
   const std::size_t blocks = samples.size() / kBlock;
-  if (blocks < 2) return {};
-  const auto block = [&](std::size_t b) { return moments(samples.subspan(b * kBlock, kBlock)); };
-  double gyro = 0, accel = 0;
-  for (std::size_t b = 1; b < blocks; ++b) {
-    const ImuMoments before = block(b - 1), after = block(b);
-    gyro += (after.gyro_mean - before.gyro_mean).squaredNorm();
-    accel += (after.accel_mean - before.accel_mean).squaredNorm();
+  if (blocks < 3) return {};
+  std::vector<Vec3> gyro_means(blocks, Vec3::Zero()), accel_means(blocks, Vec3::Zero());
+  for (std::size_t i = 0; i < blocks * kBlock; ++i) {
+    gyro_means[i / kBlock] += samples[i].gyro_radps / kBlock;
+    accel_means[i / kBlock] += samples[i].accel_mps2 / kBlock;
   }
-  // White noise: the variance of a mean, times its time.
+  double gyro = 0, accel = 0;
+  const auto bend = [](const std::vector<Vec3>& means, std::size_t b) {
+    return (means[b - 2] - 2 * means[b - 1] + means[b]).squaredNorm();
+  };
+  for (std::size_t b = 2; b < blocks; ++b) {
+    gyro += bend(gyro_means, b);
+    accel += bend(accel_means, b);
+  }
+  // White noise: the variance of a mean, times its time; a second difference has six of them.
   const double period_s = to_seconds(samples.back().stamp - samples.front().stamp) /
                           static_cast<double>(samples.size() - 1);
-  const double axes = 3, differences = static_cast<double>(blocks - 1);
-  const double share = kBlock * period_s / (2 * axes * differences);
+  const double axes = 3, differences = static_cast<double>(blocks - 2);
+  const double share = kBlock * period_s / (6 * axes * differences);
   return {std::sqrt(gyro * share), std::sqrt(accel * share)};
 }
 
@@ -67,6 +74,12 @@ ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured
   imu.gyro_walk_density *= gyro;
   imu.accel_noise_density *= accel;
   imu.accel_walk_density *= accel;
+  return imu;
+}
+
+ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured) {
+  imu.gyro_noise_density = std::max(imu.gyro_noise_density, measured.gyro);
+  imu.accel_noise_density = std::max(imu.accel_noise_density, measured.accel);
   return imu;
 }
 
@@ -97,7 +110,7 @@ bool stands_still(std::span<const ImuSample> samples, const NavigationState& x, 
   // A mean over less time is noisier.
   const double reach =
       config.still_sigma / std::sqrt(to_seconds(samples.back().stamp - samples.front().stamp));
-  const Vec3 rate = m.gyro_mean - x.b_g;
+  const Vec3 rate = x.rate(m.gyro_mean);
   const Vec3 force = accel_scale * m.accel_mean - (x.b_a - x.R_OB.transpose() * x.g_O);
   return m.gyro_std < config.max_gyro_std_radps && m.accel_std < config.max_accel_std_mps2 &&
          rate.norm() < std::hypot(config.still_rate_radps, reach * noise.gyro) &&

@@ -10,7 +10,7 @@
 
 namespace arex {
 
-/// Densities of the white noise in the readings of a standing IMU.
+/// Densities of the white noise in the readings of an IMU.
 struct WhiteNoise {
   double gyro = 0;   ///< rad/s/sqrt(Hz)
   double accel = 0;  ///< m/s^2/sqrt(Hz)
@@ -52,14 +52,19 @@ struct Standstill {
                                 double accel_scale, const StaticInitialiserConfig& config,
                                 const WhiteNoise& noise);
 
-/// By the Allan deviation over blocks of a few samples, all axes alike: the filters of the sensor,
-/// which correlate neighbours, and its bias, which moves slowly, leave it alone.
+/// By the second differences of the means of blocks of a few samples (the Hadamard deviation), all
+/// axes alike: the filters of the sensor, which correlate neighbours, and its bias, which moves
+/// slowly, leave it alone; so does a steady change of rate or force, that is, most of how a vehicle
+/// flies. In flight it is the density of what shakes the IMU, vibration above all.
 ///
-/// @pre the vehicle stands; @returns zeros for too few samples.
+/// @returns zeros for too few samples.
 [[nodiscard]] WhiteNoise white_noise(std::span<const ImuSample> samples);
 
 /// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
 /// of a worse grade, and its bias, which standing for a second cannot tell, walks in proportion.
 [[nodiscard]] ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured);
+
+/// The same for an IMU that is shaken so now: its bias is none the worse for it.
+[[nodiscard]] ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured);
 
 }  // namespace arex

@@ -64,8 +64,8 @@ struct LidarScan {
   static constexpr int kLines = 4;                   ///< that fire in turn
 
   std::string device;  ///< its name where there are several; empty: the first
-  Stamp stamp = 0;  ///< the earliest point's
-  Stamp end = 0;    ///< when the frame was closed: all of it had been fired
+  Stamp stamp = 0;     ///< the earliest point's
+  Stamp end = 0;       ///< when the frame was closed: all of it had been fired
   std::vector<LidarPoint> points;
   /// Since `stamp`, of each packet, in the order sent. Empty: who made the scan knows no packets.
   std::vector<std::uint32_t> packets_ns{};

@@ -167,8 +167,8 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
 std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (ImuInterval& imu : imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_,
-                                        filter_.state().t_d)) {
+  for (ImuInterval& imu :
+       imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_, filter_.state().t_d)) {
     gyro_.complete(imu);
     clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));

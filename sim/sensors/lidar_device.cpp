@@ -67,15 +67,13 @@ void LidarDevice::fire(const Moment& moment) {
   if (moment.now < std::min(part_begin_ + kPart, frame_end)) return;
   const auto part = static_cast<std::size_t>((part_begin_ - frame_begin) / kPart);
   if (part == 0) {
-    frame_ =
-        std::make_shared<Frame>(*lidar_, frame_begin, frame_end, (period + kPart - 1) / kPart);
+    frame_ = std::make_shared<Frame>(*lidar_, frame_begin, frame_end, (period + kPart - 1) / kPart);
   }
-  jobs_.schedule(
-      lane_, frame_end + latency_,
-      [this, ticks = part_, frame = frame_, part, frame_begin]() -> JobQueue::Delivery {
-        if (!frame->add(part, lidar_->scan(ticks, frame_begin))) return nullptr;
-        return [this, frame] { deliver(*frame); };
-      });
+  jobs_.schedule(lane_, frame_end + latency_,
+                 [this, ticks = part_, frame = frame_, part, frame_begin]() -> JobQueue::Delivery {
+                   if (!frame->add(part, lidar_->scan(ticks, frame_begin))) return nullptr;
+                   return [this, frame] { deliver(*frame); };
+                 });
   // What is fired within a frame's last tick may belong to the next.
   part_.clear();
   if (moment.now == frame_end) part_.push_back(moment.before);

@@ -135,7 +135,7 @@ LidarScan Mid360::scan(std::span<const Truth> ticks, Stamp frame_begin) const {
     for (std::size_t k = 0; k < static_cast<std::size_t>(left_out); ++k) {
       tick.rays[k].max_distance_m = -1;
     }
-    meet_airframe(tick);
+    find_self_hits(tick);
     scene_.cast(tick.rays, tick.hits);
     for (std::size_t k = 0; k < kBeams; ++k) {
       tick.cos_incidence[k] = std::abs(tick.hits[k].normal_W.dot(tick.rays[k].direction_W));
@@ -205,7 +205,7 @@ void Mid360::aim(const Truth& from, const Truth& to, Tick& tick) const {
   }
 }
 
-void Mid360::meet_airframe(Tick& tick) const {
+void Mid360::find_self_hits(Tick& tick) const {
   for (std::size_t i = 0; i < kBeams; ++i) {
     const Vec3f& d = tick.directions_L[i];
     AirframeMask::BodyHit hit;
@@ -245,15 +245,15 @@ void Mid360::split_beams(Tick& tick) const {
   for (std::size_t i = 0; i < kBeams; ++i) {
     const RayHit& hit = tick.hits[i];
     if (!hit.valid()) continue;
-    const std::uint64_t luck =
+    const std::uint64_t draw =
         beam_stream_.fork(static_cast<std::uint64_t>(tick.first_firing) + i).bits();
-    if (static_cast<float>((luck >> 8) & 0xFFFF) * 0x1p-16F >= merged_share) continue;
+    if (static_cast<float>((draw >> 8) & 0xFFFF) * 0x1p-16F >= merged_share) continue;
     const Vec3f& d = tick.rays[i].direction_W;
-    const Vec3f& offset = kSphere.points[luck & 0xFF];
+    const Vec3f& offset = kSphere.points[draw & 0xFF];
     rays[count] = {tick.rays[i].origin_W, d + half_width * (offset - d.dot(offset) * d),
                    std::max(0.0F, hit.distance_m - separation), hit.distance_m + separation};
     // The centre's surface covers at least half of the beam.
-    shares[count] = static_cast<float>(luck >> 40) * 0x1p-25F;
+    shares[count] = static_cast<float>(draw >> 40) * 0x1p-25F;
     beams[count++] = i;
   }
   scene_.cast({rays.data(), count}, {hits.data(), count});
@@ -307,8 +307,8 @@ void Mid360::receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>
       continue;
     }
     RandomStream stream = stream_.fork(static_cast<std::uint64_t>(tick.first_firing) + i);
-    const std::uint64_t luck = stream.bits();
-    if ((luck & 0xFFFFFFFF) < false_below) {
+    const std::uint64_t draw = stream.bits();
+    if ((draw & 0xFFFFFFFF) < false_below) {
       point.p_L = static_cast<float>(stream.uniform(echo.blind_m, echo.max_range_m)) * d;
       point.intensity = static_cast<float>(stream.uniform_int(0, kFalseAlarmIntensity));
       point.tag = LidarTag::kLow << LidarTag::kWeakShift;
@@ -316,7 +316,7 @@ void Mid360::receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>
       continue;
     }
     const float chance = kept * echo_.fast_return_probability(cosine);
-    if (!visible || static_cast<float>(luck >> 40) * 0x1p-24F >= chance) continue;
+    if (!visible || static_cast<float>(draw >> 40) * 0x1p-24F >= chance) continue;
     // One isotropic draw: along the beam it is the range error, across it the angle error.
     const Vec3f noise = stream.normal3().cast<float>();
     const float along = noise.dot(d);

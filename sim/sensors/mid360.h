@@ -115,7 +115,7 @@ class Mid360 : public LidarModel {
  private:
   struct Tick;  ///< the 200 beams of one tick and what they meet
   void aim(const Truth& from, const Truth& to, Tick& tick) const;
-  void meet_airframe(Tick& tick) const;
+  void find_self_hits(Tick& tick) const;
   void split_beams(Tick& tick) const;
   void receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>& points) const;
   [[nodiscard]] std::uint8_t tag_of(const Tick& tick, std::size_t beam) const;

@@ -82,7 +82,7 @@ double bounding_radius(Kind kind, const Vec3& size) {
 }
 
 /// Direction of a point of the unfolded octahedron, u and v in [-1, 1].
-Vec3 unfold(double u, double v) {
+Vec3 octahedral_direction(double u, double v) {
   Vec3 d(u, v, 1 - std::abs(u) - std::abs(v));
   if (d.z() < 0) {
     d.x() = (1 - std::abs(v)) * (u < 0 ? -1 : 1);
@@ -106,11 +106,12 @@ AirframeMask::AirframeMask(const std::vector<worlds::CollisionShape>& airframe_B
   for (int row = 0; row < kCells; ++row) {
     for (int column = 0; column < kCells; ++column) {
       const double u = -1 + (column + 0.5) * kStep, v = -1 + (row + 0.5) * kStep;
-      const Vec3 centre = unfold(u, v);
+      const Vec3 centre = octahedral_direction(u, v);
       double half_width = 0;
       for (const double du : {-0.51 * kStep, 0.51 * kStep}) {
         for (const double dv : {-0.51 * kStep, 0.51 * kStep}) {
-          const Vec3 corner = unfold(std::clamp(u + du, -1.0, 1.0), std::clamp(v + dv, -1.0, 1.0));
+          const Vec3 corner =
+              octahedral_direction(std::clamp(u + du, -1.0, 1.0), std::clamp(v + dv, -1.0, 1.0));
           half_width = std::max(half_width, (corner - centre).norm());
         }
       }

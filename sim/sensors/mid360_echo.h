@@ -83,16 +83,16 @@ class EchoModel {
 
  private:
   static constexpr int kSteps = 2048;
-  using Table = std::array<float, kSteps + 2>;
-  static float look_up(const Table& table, float fraction);
+  using LookupTable = std::array<float, kSteps + 2>;
+  static float look_up(const LookupTable& table, float fraction);
 
   EchoConfig config_;
-  Table sigma_factor_{};  ///< over cos(incidence), 0..1
-  Table probability_{};   ///< over cos(incidence), 0..1
-  Table needed_{};        ///< reflectivity * cos over range / max_range, 0..1
+  LookupTable sigma_factor_{};  ///< over cos(incidence), 0..1
+  LookupTable probability_{};   ///< over cos(incidence), 0..1
+  LookupTable needed_{};        ///< reflectivity * cos over range / max_range, 0..1
 };
 
-inline float EchoModel::look_up(const Table& table, float fraction) {
+inline float EchoModel::look_up(const LookupTable& table, float fraction) {
   const float position = fraction * kSteps;
   const auto index = static_cast<std::size_t>(position);
   const float rest = position - static_cast<float>(index);

@@ -13,8 +13,9 @@
 ///
 /// Error state, 28x1: [R_OB, p_OB, v_OB, b_g, b_a, g_O | R_BL, p_BL | s_g, t_d], rotation errors on
 /// the right (R <- R Exp(d)). What follows the first bar are the optional online extrinsics and the
-/// IMU's intrinsics; with zero covariance they stay where they are. Sources: Xu and Zhang, FAST-LIO,
-/// RA-L 2021; AREX paper, eqs. (2)-(3), (6)-(9); t_d as Qin and Shen, IROS 2018, estimate it.
+/// IMU's intrinsics; with zero covariance they stay where they are. Sources: Xu and Zhang,
+/// FAST-LIO, RA-L 2021; AREX paper, eqs. (2)-(3), (6)-(9); t_d as Qin and Shen, IROS 2018, estimate
+/// it.
 namespace arex {
 
 struct NavigationState {

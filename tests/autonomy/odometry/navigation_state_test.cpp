@@ -145,7 +145,10 @@ TEST(NavigationState, JacobianIsThePapersToFirstOrder) {
     paper.block<3, 3>(kVelocity, kRotation) = -x.R_OB * so3::hat(imu.accel_begin - x.b_a) * dt;
     paper.block<3, 3>(kVelocity, kAccelBias) = -x.R_OB * dt;
     paper.block<3, 3>(kVelocity, kGravityBlock) = Mat3::Identity() * dt;
-    const double difference = (propagation_jacobians(x, imu).F - paper).topLeftCorner<kGyroScale, kGyroScale>().cwiseAbs().maxCoeff();
+    const double difference = (propagation_jacobians(x, imu).F - paper)
+                                  .topLeftCorner<kGyroScale, kGyroScale>()
+                                  .cwiseAbs()
+                                  .maxCoeff();
     EXPECT_LT(difference, 30 * dt * dt);
     EXPECT_GT(difference, 0);
   }

@@ -171,6 +171,38 @@ double ForestRecipe::expected_triangles() const {
   return per_m2 * size_m.prod();
 }
 
+ForestRecipe pine_stand() {
+  ForestRecipe recipe;
+  recipe.tree_density_per_m2 = 0.18;
+  recipe.min_spacing_m = 1.4;
+  recipe.relief_m = 0.3;
+  TreeRecipe& tree = recipe.tree;
+  tree.trunk_radius_m = 0.11;
+  tree.trunk_radius_spread_m = 0.02;
+  tree.trunk_radius_min_m = 0.07;
+  tree.trunk_radius_max_m = 0.18;
+  tree.height_m = 19.4;
+  tree.height_spread_m = 1.2;
+  tree.root_flare = 0.3;
+  tree.lean_rad = 0.015;
+  tree.bend_m = 0.06;
+  tree.crown_base_fraction = 0.62;
+  tree.crown_radius_m = 1.6;
+  tree.branches = 22;
+  tree.twigs_per_branch = 2;
+  tree.low_branches = 5;  // dead ones
+  tree.low_branch_low_m = 1.5;
+  tree.low_branch_high_m = 9;
+  tree.low_branch_length_m = 0.6;
+  tree.leaf_length_m = 0.3;
+  UndergrowthRecipe& undergrowth = recipe.undergrowth;
+  undergrowth.shrub_density_per_m2 = 0.01;
+  undergrowth.fern_density_per_m2 = 0.08;
+  undergrowth.log_density_per_m2 = 0.008;
+  undergrowth.log_radius_m = 0.1;
+  return recipe;
+}
+
 World build(const ForestRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream ground_stream(seed, "worlds/forest/ground");

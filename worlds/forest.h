@@ -123,6 +123,11 @@ struct ForestRecipe {
   }
 };
 
+/// A pine plantation past its first thinnings: 0.18 stems/m^2 of 0.22 m mean diameter, 19.4 m high
+/// (a surveyed stand), straight and bare but for dead branches up to its high, narrow crowns, on
+/// ground with little growth.
+ForestRecipe pine_stand();
+
 /// W's origin is at the start's x and y. World::bounds spans the ground and reaches the highest
 /// leaf.
 World build(const ForestRecipe& recipe, std::uint64_t seed);

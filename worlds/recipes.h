@@ -12,9 +12,9 @@
 
 namespace arex::worlds {
 
-enum class WorldKind { kForest, kGarage, kGaps, kEmpty, kOrchard, kFile };
-constexpr std::array<std::string_view, 6> enum_names(WorldKind) {
-  return {"forest", "garage", "gaps", "empty", "orchard", "file"};
+enum class WorldKind { kForest, kGarage, kGaps, kEmpty, kOrchard, kPine, kFile };
+constexpr std::array<std::string_view, 7> enum_names(WorldKind) {
+  return {"forest", "garage", "gaps", "empty", "orchard", "pine", "file"};
 }
 
 /// The `world` section of a scenario: which recipe, and the recipes' parameters. Only the chosen
@@ -27,15 +27,17 @@ struct WorldConfig {
   GapsRecipe gaps;
   EmptyRecipe empty;
   OrchardRecipe orchard;
+  ForestRecipe pine = pine_stand();
   FileRecipe file;
 
   void fields(auto& f) {
-    f("kind", kind, "forest, garage, gaps, empty, orchard or file");
+    f("kind", kind, "forest, garage, gaps, empty, orchard, pine or file");
     f("forest", forest, "recipe of kind forest");
     f("garage", garage, "recipe of kind garage");
     f("gaps", gaps, "recipe of kind gaps");
     f("empty", empty, "recipe of kind empty");
     f("orchard", orchard, "recipe of kind orchard");
+    f("pine", pine, "recipe of kind pine: the forest's, with the figures of a pine stand");
     f("file", file, "what somebody else has made, for kind file");
     f.check(kind != Kind::kFile || !file.path.empty(),
             "file.path, a mesh, Gazebo world, octree or cloud");
@@ -56,6 +58,8 @@ auto with_recipe(const WorldConfig& config, const Use& use) {
       return use(config.empty);
     case WorldKind::kOrchard:
       return use(config.orchard);
+    case WorldKind::kPine:
+      return use(config.pine);
     default:
       return use(config.forest);
   }

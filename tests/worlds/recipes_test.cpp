@@ -31,7 +31,7 @@ TEST(BuildWorld, GivesASolvableGarageForEverySeed) {
 
 TEST(BuildWorld, IsDeterministicForEveryKind) {
   for (const WorldKind kind : {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps,
-                               WorldKind::kEmpty, WorldKind::kOrchard}) {
+                               WorldKind::kEmpty, WorldKind::kOrchard, WorldKind::kPine}) {
     const WorldConfig config = config_of(kind);
     const std::uint64_t hash = world_hash(build_world(config, 3, kRadius));
     EXPECT_EQ(world_hash(build_world(config, 3, kRadius)), hash);
@@ -41,9 +41,9 @@ TEST(BuildWorld, IsDeterministicForEveryKind) {
 
 TEST(BuildWorld, LiesWithinTheExtentThatIsKnownBefore) {
   for (const WorldKind kind : {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps,
-                               WorldKind::kEmpty, WorldKind::kOrchard}) {
+                               WorldKind::kEmpty, WorldKind::kOrchard, WorldKind::kPine}) {
     WorldConfig config = config_of(kind);
-    config.forest.size_m = {40, 30};
+    config.forest.size_m = config.pine.size_m = {40, 30};
     config.gaps.width_m = 12;
     config.empty.size_m = {20, 24};
     config.garage.length_m = 80;

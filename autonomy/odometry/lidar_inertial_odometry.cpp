@@ -1,5 +1,6 @@
 #include "odometry/lidar_inertial_odometry.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace arex {
@@ -12,6 +13,7 @@ LidarInertialOdometry::LidarInertialOdometry(const LidarInertialConfig& config, 
                                              double body_radius_m)
     : health_(config.health),
       corrector_(config, X_BL, body_radius_m),
+      imu_delay_s_(config.imu.delay_s),
       full_scale_(config.imu.gyro_range_radps) {}
 
 Odometry LidarInertialOdometry::add_imu(const ImuSample& imu) {
@@ -31,6 +33,7 @@ void LidarInertialOdometry::apply(const ScanUpdate& update) {
   scan_status_ = update.status;
   scan_need_ = update.need;
   odometry_.correction_stamp = update.correction_stamp;
+  odometry_.covariance = update.pose_covariance;
   if (update.status == OdometryStatus::kInitialising) {
     predictor_ = {};  // of a start that is taken back
     odometry_.status = update.status;
@@ -54,14 +57,17 @@ OdometryNeed LidarInertialOdometry::need() const {
 }
 
 void LidarInertialOdometry::publish() {
-  const std::optional<NavigationState> state = predictor_.at(newest_.stamp);
-  odometry_.stamp = newest_.stamp;
+  // By the LiDAR's clock, as far as the IMU's is known to be off; it never runs backwards.
+  const std::optional<double> t_d = predictor_.time_offset();
+  const Stamp clock_offset = t_d ? from_seconds(*t_d - imu_delay_s_) : 0;
+  odometry_.stamp = std::max(odometry_.stamp, newest_.stamp - clock_offset);
   odometry_.status = scan_status_;
+  const std::optional<NavigationState> state = predictor_.at(odometry_.stamp);
   if (!state) return;
   odometry_.X_OB = state->X_OB();
   odometry_.v_OB = state->v_OB;
   odometry_.w_OB_B = state->rate(newest_.gyro_radps);
-  const double silence_s = to_seconds(newest_.stamp - odometry_.correction_stamp);
+  const double silence_s = to_seconds(odometry_.stamp - odometry_.correction_stamp);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
   } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {

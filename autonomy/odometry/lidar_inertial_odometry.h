@@ -56,6 +56,7 @@ class LidarInertialOdometry {
   OdometryHealthConfig health_;
   ScanCorrector corrector_;
   ImuPredictor predictor_;
+  double imu_delay_s_;
   GyroFullScale full_scale_;
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;

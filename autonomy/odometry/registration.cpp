@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "math/mix.h"
 #include "math/so3.h"
@@ -14,10 +15,13 @@
 namespace arex {
 namespace {
 
+constexpr double kLeastInformation = 1e-9;  // keeps the algebra regular
+
 struct Linearisation {
   PoseInformation information;
   int matched = 0;
   double sum_squared_sigma = 0;
+  std::vector<int> born;  ///< of the matched surfels
 };
 
 /// Sums the residuals of all points at the iterate `x`, in the order of the points.
@@ -30,6 +34,7 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
   const Pose X_OL = x.X_OB() * x.X_BL;
   constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
   Linearisation sum;
+  sum.born.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ScanPoint& point = points[i];
     if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
@@ -40,6 +45,7 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
     const double pose_variance = residual.h.dot(P_pose * residual.h);
     if (r2 > gate2 * (residual.variance_m2 + pose_variance)) continue;
     ++sum.matched;
+    sum.born.push_back(match->born);
     const double sigma2 = r2 / residual.variance_m2;
     sum.sum_squared_sigma += sigma2;
     const double weight =
@@ -54,7 +60,6 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
 /// What is left of a block's information once the other block is unknown too, as deviations.
 void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec3& deviations,
                       Vec3& worst_axis) {
-  constexpr double kLeastInformation = 1e-9;
   const Mat3 regular = other + kLeastInformation * Mat3::Identity();
   const Mat3 schur = own - cross * regular.inverse() * cross.transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (schur + schur.transpose()));
@@ -132,6 +137,10 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
     const Mat3 rr = A.block<3, 3>(0, 0), rp = A.block<3, 3>(0, 3), pp = A.block<3, 3>(3, 3);
     block_deviations(pp, rp.transpose(), rr, report.position_std_m, report.worst_position_axis_O);
     block_deviations(rr, rp, pp, report.rotation_std_rad, report.worst_rotation_axis_B);
+    const PoseCovariance own =
+        A.topLeftCorner<6, 6>() + kLeastInformation * PoseCovariance::Identity();
+    report.covariance = own.ldlt().solve(PoseCovariance::Identity());
+    report.born = std::move(at_x.born);
   }
   report.accepted =
       at_x.matched >= config.health.min_matches &&

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "odometry/error_state_filter.h"
+#include "odometry/map_drift.h"
 #include "odometry/surfel_map.h"
 #include "odometry/undistortion.h"
 
@@ -22,6 +23,8 @@ struct RegistrationReport {
   Vec3 rotation_std_rad = Vec3::Zero();
   Vec3 worst_position_axis_O = Vec3::UnitZ();
   Vec3 worst_rotation_axis_B = Vec3::UnitZ();
+  PoseCovariance covariance = PoseCovariance::Zero();  ///< that this scan alone leaves; X_BL known
+  std::vector<int> born;  ///< of the surfels of the matched points, at the last iterate
 };
 
 /// One point per cell of a grid in L, the first in firing order; of these, evenly spaced ones,

@@ -21,6 +21,13 @@ std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoi
   return fractions;
 }
 
+/// The covariance with its rotation in the axes that R turns it to.
+PoseCovariance turned(const PoseCovariance& covariance, const Mat3& R) {
+  PoseCovariance T = PoseCovariance::Identity();
+  T.topLeftCorner<3, 3>() = R;
+  return T * covariance * T.transpose();
+}
+
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -52,7 +59,11 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
         doubtful_in_a_row_ == 0) {
       points_O = to_O(points);
       fractions = fractions_of(*job.scan, points);
-      if (confirmations_left_ == 0) insert(points, points_O);
+      map_covariance_ = drift_.met(update.registration.born);
+      if (confirmations_left_ == 0) {
+        insert(points, points_O,
+               map_covariance_ + turned(update.registration.covariance, filter_.state().R_OB));
+      }
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
     update.fractions = std::make_shared<const std::vector<float>>(std::move(fractions));
@@ -63,6 +74,9 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   update.need = need_;
   update.state = filter_.state();
   update.covariance = filter_.covariance();
+  const Mat3 R_BO = filter_.state().R_OB.transpose();
+  update.pose_covariance = filter_.pose_covariance().topLeftCorner<6, 6>();
+  update.pose_covariance += turned(map_covariance_, R_BO);
   update.accel_scale = accel_scale_;
   update.gyro = gyro_;
   return update;
@@ -102,14 +116,14 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
     still.end = scan->end;
     still.X_OB = filter_.state().X_OB();
     points = undistort(*scan, {still}, X_BL_, config_.lidar, body_radius_m_);
-    insert(points, to_O(points));
+    insert(points, to_O(points), PoseCovariance::Zero());
   }
   // A filter that no scan can correct runs away within seconds.
   ErrorStateFilter tried = filter_;
   points =
       voxel_downsample(points, config_.registration.scan_voxel_m, config_.registration.max_points);
   if (!register_scan(points, map_, config_, tried).accepted) {
-    map_ = SurfelMap(config_.map);
+    forget_map();
     return false;
   }
   stamp_ = correction_stamp_ = stamp;
@@ -118,8 +132,14 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   return true;
 }
 
+void ScanCorrector::forget_map() {
+  map_.clear();
+  drift_.clear();
+  map_covariance_.setZero();
+}
+
 void ScanCorrector::start_again() {
-  map_ = SurfelMap(config_.map);
+  forget_map();
   stood_at_.reset();
   status_ = OdometryStatus::kInitialising;
   need_ = OdometryNeed::kReference;
@@ -250,8 +270,8 @@ std::vector<Vec3f> ScanCorrector::to_O(const std::vector<ScanPoint>& points) con
   return points_O;
 }
 
-void ScanCorrector::insert(const std::vector<ScanPoint>& points,
-                           const std::vector<Vec3f>& points_O) {
+void ScanCorrector::insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O,
+                           const PoseCovariance& covariance) {
   std::vector<float> variances;
   variances.reserve(points.size());
   for (const ScanPoint& point : points) {
@@ -259,7 +279,8 @@ void ScanCorrector::insert(const std::vector<ScanPoint>& points,
     variances.push_back(static_cast<float>(config_.lidar.range_variance(range) +
                                            config_.lidar.lateral_variance(range)));
   }
-  map_.insert(points_O, variances);
+  map_.insert(points_O, variances, drift_.next());
+  drift_.add(covariance);
 }
 
 }  // namespace arex

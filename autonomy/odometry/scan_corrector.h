@@ -31,7 +31,9 @@ struct ScanUpdate {
   OdometryStatus status = OdometryStatus::kInitialising;
   OdometryNeed need = OdometryNeed::kImu;  ///< what keeps the status from being ok
   NavigationState state;
-  ErrorMatrix covariance = ErrorMatrix::Zero();
+  ErrorMatrix covariance = ErrorMatrix::Zero();  ///< the filter's, on the map as it is
+  PoseCovariance pose_covariance =
+      PoseCovariance::Zero();  ///< in B and O, the map's error included
   double accel_scale = 1;
   GyroCompletion gyro;        ///< of the axes that are clipped
   bool gyro_clipped = false;  ///< during this scan
@@ -58,6 +60,7 @@ class ScanCorrector {
   bool start(const StaticStart& standing, Stamp stamp);
   /// Forgets the map: whatever it came from, the vehicle has not left the ground yet.
   void start_again();
+  void forget_map();
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
   /// Before take-off the vehicle is where it started: holds the filter there, by a
   /// pseudo-measurement, while it stands.
@@ -65,7 +68,10 @@ class ScanCorrector {
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
-  void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
+  /// @param covariance with which the points stand in O: the map's where they were registered, and
+  /// the registration's; axes of O
+  void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O,
+              const PoseCovariance& covariance);
   [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
 
   LidarInertialConfig config_;
@@ -74,6 +80,8 @@ class ScanCorrector {
   double body_radius_m_;
   ErrorStateFilter filter_;
   SurfelMap map_;
+  MapDrift drift_;
+  PoseCovariance map_covariance_ = PoseCovariance::Zero();  ///< of the map as last met, axes of O
   double accel_scale_ = 1;
   GyroCompletion gyro_;
   ImuBuffer imu_;

@@ -57,9 +57,8 @@ void SurfelMap::clear() {
   while (slots < 2 * capacity) slots *= 2;
   for (Level& level : levels_) {
     level.slots.assign(slots, Slot{});
-    level.cells.assign(capacity, Cell{});
-    level.surfels.assign(capacity, Surfel{});
-    level.used = 0;
+    level.cells.clear();
+    level.surfels.clear();
     level.hand = 0;
   }
 }
@@ -84,8 +83,12 @@ void SurfelMap::erase_slot(Level& level, std::size_t hole) {
   level.slots[hole] = Slot{};
 }
 
-std::uint32_t SurfelMap::make_room(Level& level) {
-  if (level.used < level.cells.size()) return static_cast<std::uint32_t>(level.used++);
+std::uint32_t SurfelMap::make_room(Level& level) const {
+  if (level.cells.size() < static_cast<std::size_t>(config_.capacity)) {
+    level.cells.emplace_back();
+    level.surfels.emplace_back();
+    return static_cast<std::uint32_t>(level.cells.size() - 1);
+  }
   for (;;) {
     const std::size_t index = level.hand;
     level.hand = (level.hand + 1) % level.cells.size();
@@ -98,7 +101,7 @@ std::uint32_t SurfelMap::make_room(Level& level) {
   }
 }
 
-SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key) {
+SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key, int insertion) {
   std::size_t i = slot_of(level, key);
   if (level.slots[i].cell == kNone) {
     const std::uint32_t index = make_room(level);
@@ -106,6 +109,7 @@ SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key) {
     level.cells[index].key = key;
     level.cells[index].refresh_at = config_.min_points;
     level.surfels[index] = Surfel{};
+    level.surfels[index].born = insertion;
     i = slot_of(level, key);  // making room may have moved slots
     level.slots[i] = {key, index, 0, 0};
   }
@@ -113,7 +117,8 @@ SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key) {
   return level.slots[i];
 }
 
-void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2) {
+void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2,
+                       int insertion) {
   // Level by level and with the slots asked for ahead: the time goes into waiting for memory.
   constexpr std::size_t kAhead = 16;
   std::vector<Vec3> points_G;
@@ -130,7 +135,7 @@ void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> v
     for (std::size_t i = 0; i < points_G.size(); ++i) {
       const float weight = static_cast<float>(kUnitVariance) / variances_m2[i];
       const Vec3 centre = centre_of(points_G[i], level.edge_m, level.inverse_edge);
-      add(level, obtain(level, keys[i % kAhead]), points_G[i] - centre, weight);
+      add(level, obtain(level, keys[i % kAhead], insertion), points_G[i] - centre, weight);
       if (i + kAhead < points_G.size()) look_ahead(i + kAhead);
     }
   }
@@ -219,7 +224,7 @@ std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
     const Vec3 d = p_G - mean;
     const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
     if (!best || variance < best->variance_m2) {
-      best = SurfelMatch{to_vec3(surfel.normal), mean, variance, static_cast<int>(l)};
+      best = SurfelMatch{to_vec3(surfel.normal), mean, variance, static_cast<int>(l), surfel.born};
     }
   }
   if (best) {
@@ -239,8 +244,8 @@ bool SurfelMap::occupied(const Vec3& p_O) const {
 std::size_t SurfelMap::memory_bytes() const {
   std::size_t bytes = 0;
   for (const Level& level : levels_) {
-    bytes += level.slots.size() * sizeof(Slot) + level.cells.size() * sizeof(Cell) +
-             level.surfels.size() * sizeof(Surfel);
+    bytes += level.slots.capacity() * sizeof(Slot) + level.cells.capacity() * sizeof(Cell) +
+             level.surfels.capacity() * sizeof(Surfel);
   }
   return bytes;
 }

@@ -16,6 +16,7 @@ struct SurfelMatch {
   double variance_m2 = 0;  ///< of the surface's height along the normal at the query: thickness
                            ///< and the fit's own variance
   int level = 0;           ///< 0: the finest
+  int born = 0;            ///< the insertion that began its cell
 };
 
 /// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell
@@ -35,7 +36,9 @@ class SurfelMap {
   void clear();
 
   /// Adds points, each with the variance of its position.
-  void insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2);
+  /// @param insertion a number for what it begins, SurfelMatch::born
+  void insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2,
+              int insertion = 0);
 
   /// Asks the memory for what find(p_O) will read.
   void prefetch(const Vec3& p_O) const;
@@ -54,7 +57,7 @@ class SurfelMap {
     return config_.finest_edge_m * static_cast<double>(1 << level);
   }
   [[nodiscard]] std::size_t cells(int level) const {
-    return levels_[static_cast<std::size_t>(level)].used;
+    return levels_[static_cast<std::size_t>(level)].cells.size();
   }
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -85,6 +88,7 @@ class SurfelMap {
     std::array<float, 3> normal{};
     std::array<float, 6> regression{};
     float thickness_m2 = -1;  ///< negative: no surfel
+    std::int32_t born = 0;
   };
   /// Four to a cache line; what most insertions end at, so that a saturated cell is not fetched.
   struct Slot {
@@ -97,16 +101,15 @@ class SurfelMap {
     double edge_m = 1;
     double inverse_edge = 1;
     std::vector<Slot> slots;  ///< open addressing, linear probing, power of two
-    std::vector<Cell> cells;
+    std::vector<Cell> cells;  ///< as many as were needed so far
     std::vector<Surfel> surfels;
-    std::size_t used = 0;
     std::size_t hand = 0;  ///< CLOCK's
   };
 
   /// The slot that holds `key`, or the empty one where it would go.
   static std::size_t slot_of(const Level& level, std::uint64_t key);
-  Slot& obtain(Level& level, std::uint64_t key);
-  static std::uint32_t make_room(Level& level);
+  Slot& obtain(Level& level, std::uint64_t key, int insertion);
+  [[nodiscard]] std::uint32_t make_room(Level& level) const;
   static void erase_slot(Level& level, std::size_t hole);
   void add(Level& level, Slot& slot, const Vec3& offset_G, float weight);
   void refresh(const Level& level, const Cell& cell, Surfel& surfel) const;

@@ -144,6 +144,11 @@ std::vector<FigureInfo> odometry_figures(const std::string& section, bool flies)
        "of the last position, aligned at the first pose"},
       {section + "drift_percent", "odometry drift", "%", kLess, false,
        "the error at the end, of the path's length; null without a path"},
+      {section + "nees_rotation", "consistency of the attitude (NEES)", "", kNeither, false,
+       "mean of e^T P^-1 e / 3: 1 if the errors are as large as the odometry believes, more if "
+       "larger; null of one that gives no covariance"},
+      {section + "nees_position", "consistency of the position (NEES)", "", kNeither, false,
+       "the same of the position"},
       {section + "lost_s", "time without odometry", "s", kLess, false,
        "status lost; null if there never was an estimate"},
   };

@@ -32,7 +32,18 @@ bool FlightScorer::Track::follow(const Odometry& odometry, const Truth& truth) {
   // What the source holds for now is scored as such, whatever the IMU's clock says.
   newest = odometry.stamp;
   poses.push_back({truth.stamp, truth.X_WB, odometry.X_OB});
+  constexpr double kMoved = 0.1;  // m; where it stands it is right by definition
+  if ((truth.X_WB.p - poses.front().X_WB.p).norm() > kMoved) {
+    nees.add(poses.front(), poses.back(), odometry.covariance);
+  }
   return true;
+}
+
+OdometryScore FlightScorer::Track::score() const {
+  OdometryScore score = score_odometry(poses);
+  score.nees_rotation = nees.rotation();
+  score.nees_position = nees.position();
+  return score;
 }
 
 void FlightScorer::moved(const Truth& before, const Truth& after) {
@@ -116,10 +127,10 @@ FlightScore FlightScorer::score(const Truth& truth, const FlightView& view) cons
   score.landing_error_m = landing_error(truth, view);
   score.target_miss_m = target_miss_m_;
   score.poses = flown_.poses;
-  score.odometry = score_odometry(flown_.poses);
+  score.odometry = flown_.score();
   score.odometry_lost_s = flown_.lost_s;
   for (const auto& [name, track] : others_) {
-    if (!track.poses.empty()) score.others[name] = {score_odometry(track.poses), track.lost_s};
+    if (!track.poses.empty()) score.others[name] = {track.score(), track.lost_s};
   }
   score.clearance = clearance_.statistics();
   if (view.state == MissionState::kDone) {

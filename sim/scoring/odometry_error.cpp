@@ -91,6 +91,17 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
   return score;
 }
 
+void Nees::add(const PosePair& first, const PosePair& now,
+               const Eigen::Matrix<double, 6, 6>& covariance) {
+  if (covariance.isZero(0)) return;
+  const Pose X_OB = first.X_OB * (first.X_WB.inverse() * now.X_WB);  // the truth's
+  const Vec3 rotation = so3::Log(X_OB.R.transpose() * now.X_OB.R);
+  const Vec3 position = now.X_OB.p - X_OB.p;
+  rotation_sum_ += rotation.dot(covariance.topLeftCorner<3, 3>().ldlt().solve(rotation)) / 3;
+  position_sum_ += position.dot(covariance.bottomRightCorner<3, 3>().ldlt().solve(position)) / 3;
+  count_ += 1;
+}
+
 void add_figures(const OdometryScore& score, const std::string& section, Figures& figures) {
   figures.set(section + ".ate_rmse_m", score.ate_rmse_m);
   figures.set(section + ".ate_max_m", score.ate_max_m);
@@ -101,6 +112,8 @@ void add_figures(const OdometryScore& score, const std::string& section, Figures
   figures.set(section + ".rpe_10m_m", score.rpe_10m_m);
   figures.set(section + ".end_error_m", score.end_error_m);
   figures.set(section + ".drift_percent", score.drift_percent);
+  figures.set(section + ".nees_rotation", score.nees_rotation);
+  figures.set(section + ".nees_position", score.nees_position);
 }
 
 }  // namespace arex::sim

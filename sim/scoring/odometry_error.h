@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct OdometryScore {
   double rpe_10m_m = kUnknown;          ///< the same over 10 m
   double end_error_m = kUnknown;        ///< of the last position, aligned at the first pose
   double drift_percent = kUnknown;      ///< the same, of the length of the true path
+  double nees_rotation = kUnknown;      ///< Nees, mean
+  double nees_position = kUnknown;
 };
 
 /// The pose of O in W that makes the first pair agree.
@@ -49,6 +52,22 @@ double relative_error(const std::vector<PosePair>& pairs, double path_m, std::si
 
 /// @pre pairs are in order of time. An empty run has no score.
 OdometryScore score_odometry(const std::vector<PosePair>& pairs);
+
+/// Normalised estimation error squared, per dimension: e^T P^-1 e / 3 of attitude and of position,
+/// aligned at the first pose. One in the mean, if the errors are as large as their covariance says
+/// (Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation, 5.4).
+class Nees {
+ public:
+  /// @param covariance of [rotation in B, position in O]; one of zeros is passed over
+  void add(const PosePair& first, const PosePair& now,
+           const Eigen::Matrix<double, 6, 6>& covariance);
+  [[nodiscard]] double rotation() const { return rotation_sum_ / count_; }
+  [[nodiscard]] double position() const { return position_sum_ / count_; }
+
+ private:
+  double rotation_sum_ = 0, position_sum_ = 0;
+  double count_ = 0;
+};
 
 /// Sets the figures of the section that the poses tell.
 /// @param section "odometry", or "odometries.NAME"

@@ -22,6 +22,10 @@ class ImuPredictor {
   /// The state at `stamp`, the newest sample held if that lies behind; nothing before the first
   /// anchor.
   [[nodiscard]] std::optional<NavigationState> at(Stamp stamp) const;
+  /// NavigationState::t_d of the anchor, s.
+  [[nodiscard]] std::optional<double> time_offset() const {
+    return head_ ? std::optional(head_->t_d) : std::nullopt;
+  }
 
  private:
   void advance();

@@ -61,7 +61,7 @@ void add_nees(const ScanUpdate& update, const Pose& X_OB_true, Result& result) {
   truth.p_OB = X_OB_true.p;
   const ErrorVector e = local(update.state, truth);
   const auto nees = [&](int block) {
-    const Mat3 P = update.covariance.block<3, 3>(block, block);
+    const Mat3 P = update.pose_covariance.block<3, 3>(block, block);
     return e.segment<3>(block).dot(P.ldlt().solve(e.segment<3>(block)));
   };
   result.attitude_nees.push_back(nees(kRotation));

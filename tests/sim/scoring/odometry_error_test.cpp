@@ -85,6 +85,35 @@ TEST(OdometryScore, ReportsTheLargestHeadingError) {
   EXPECT_NEAR(score_odometry(pairs).yaw_error_max_deg, 2.0, 1e-9);
 }
 
+// Errors drawn from the covariance have a NEES of one per dimension; of twice the size, of four.
+TEST(Nees, IsOneIfTheErrorsAreAsLargeAsTheCovarianceSays) {
+  for (const double factor : {1.0, 2.0}) {
+    RandomStream random(3, "nees");
+    Eigen::Matrix<double, 6, 6> L = Eigen::Matrix<double, 6, 6>::Zero();
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j <= i; ++j) L(i, j) = 1e-3 * random.normal();
+      L(i, i) += 3e-3;
+    }
+    const PosePair first{0, {so3::Exp({0.1, 0.2, 1}), {3, 2, 1}}, {so3::Exp({0, 0, 0.3}), {}}};
+    Nees nees;
+    nees.add(first, first, Eigen::Matrix<double, 6, 6>::Zero());  // no covariance: not counted
+    for (int i = 0; i < 20'000; ++i) {
+      Eigen::Matrix<double, 6, 1> e;
+      for (int k = 0; k < 6; ++k) e[k] = factor * random.normal();
+      e = L * e;
+      const Pose X_OB{so3::Exp(random.normal3()), 5 * random.normal3()};
+      PosePair now;
+      now.X_WB = first.X_WB * first.X_OB.inverse() * X_OB;
+      now.X_OB = {X_OB.R * so3::Exp(e.head<3>()), X_OB.p + e.tail<3>()};
+      nees.add(first, now, L * L.transpose());
+    }
+    // The mean of n chi-square variables of 3 dimensions, each over 3, has sigma sqrt(2 / 3n).
+    EXPECT_NEAR(nees.rotation(), factor * factor, 0.03 * factor * factor);
+    EXPECT_NEAR(nees.position(), factor * factor, 0.03 * factor * factor);
+  }
+  EXPECT_TRUE(std::isnan(Nees{}.rotation()));
+}
+
 TEST(OdometryError, WhatWasNotFlownIsNotScored) {
   const OdometryScore none = score_odometry({});
   for (const double figure : {none.ate_rmse_m, none.ate_max_m, none.ate_se3_rmse_m,

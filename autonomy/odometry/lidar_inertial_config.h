@@ -1,5 +1,6 @@
 #pragma once
 
+#include "odometry/inertial/imu_watch.h"
 #include "odometry/inertial/inertial_config.h"
 
 namespace arex {
@@ -91,6 +92,7 @@ struct RegistrationConfig {
 
 /// When the estimate is called degenerate or lost, and how it is found again.
 struct OdometryHealthConfig {
+  ImuWatchConfig imu;
   int min_matches = 150;
   double min_match_fraction = 0.25;
   double degenerate_position_std_m = 0.02;
@@ -111,6 +113,7 @@ struct OdometryHealthConfig {
   int recovery_confirmations = 3;
 
   void fields(auto& f) {
+    f("imu", imu, "what of the IMU is told as a fault");
     f("min_matches", min_matches, "fewer matched points are no correction");
     f("min_match_fraction", min_match_fraction, "a smaller share of the points is no correction");
     f("degenerate_position_std_m", degenerate_position_std_m,

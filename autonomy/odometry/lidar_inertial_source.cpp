@@ -1,5 +1,7 @@
 #include "odometry/lidar_inertial_source.h"
 
+#include <utility>
+
 namespace arex {
 
 std::optional<OdometrySource::Job> LidarInertialSource::add_scan(const LidarScanPtr& scan) {
@@ -10,6 +12,9 @@ std::optional<OdometrySource::Job> LidarInertialSource::add_scan(const LidarScan
 
 void LidarInertialSource::apply(const ScanUpdate& update) {
   odometry_.apply(update);
+  for (std::string& fault : imu_watch_.update(update.state, update.covariance)) {
+    faults_.push_back(std::move(fault));
+  }
   if (update.recovered) poses_.clear();
   poses_.add(odometry_.odometry());
   RegisteredScan scan;

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "messages/estimates.h"
@@ -33,6 +34,8 @@ class OdometrySource {
   [[nodiscard]] virtual const Odometry& odometry() const = 0;
   /// What keeps it from being ok.
   [[nodiscard]] virtual OdometryNeed need() const = 0;
+  /// What it has found to be wrong with its sensors since the last call, for events.
+  virtual std::vector<std::string> take_faults() { return {}; }
   /// Scans placed since the last call, for the maps.
   virtual std::vector<RegisteredScan> take_scans() { return {}; }
 };

@@ -119,6 +119,9 @@ void Stack::add_scan(const LidarScanPtr& scan) {
 void Stack::collect(Source& source) {
   const std::vector<RegisteredScan> scans = source.odometry->take_scans();
   if (&source != &sources_.front()) return;
+  for (const std::string& fault : source.odometry->take_faults()) {
+    report(EventKind::kSensorFault, fault);
+  }
   for (const RegisteredScan& scan : scans) {
     if (scan.matched_share) lidar_watch_.add_matched_share(*scan.matched_share);
   }

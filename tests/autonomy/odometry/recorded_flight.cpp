@@ -13,7 +13,7 @@ Pose mounting() { return VehicleConfig{}.X_BL(); }
 
 Recording record(const AnalyticWorld& world, const AnalyticMotion& motion, double duration_s,
                  const SensorNoise& noise, std::uint64_t seed, int stride, const Pose& X_BL) {
-  Recording r{world, motion, {}, {}};
+  Recording r{world, motion, {}, {}, 0};
   const Stamp end = from_seconds(duration_s);
   r.imu = simulate_imu(motion, end, noise, seed);
   for (Stamp t = 0; t + kFrame <= end; t += kFrame) {
@@ -35,6 +35,15 @@ const Recording& standing() {
   return r;
 }
 
+Recording with_imu(Recording recording, const Vec3& gyro_scale, Stamp clock_offset) {
+  for (ImuSample& sample : recording.imu) {
+    sample.gyro_radps = sample.gyro_radps.cwiseProduct(gyro_scale);
+    sample.stamp += clock_offset;
+  }
+  recording.imu_clock_offset = clock_offset;
+  return recording;
+}
+
 LidarInertialConfig defaults() {
   LidarInertialConfig config;
   config.imu.delay_s = 0;
@@ -49,12 +58,13 @@ Flown fly(const Recording& r, const LidarInertialConfig& config, Stamp latency,
   std::optional<ScanUpdate> pending;
   for (const ImuSample& sample : r.imu) {
     const Odometry now = odometry.add_imu(sample);
-    if (next < r.scans.size() && sample.stamp >= r.scans[next]->end) {
+    const Stamp arrival = sample.stamp - r.imu_clock_offset;
+    if (next < r.scans.size() && arrival >= r.scans[next]->end) {
       LidarScanPtr scan = r.scans[next++];
       if (tamper) scan = tamper(scan);
       if (scan) pending = odometry.correct(odometry.prepare(scan));
     }
-    if (pending && sample.stamp >= pending->stamp + latency) {
+    if (pending && arrival >= pending->stamp + latency) {
       odometry.apply(*pending);
       if (now.status != OdometryStatus::kInitialising) {
         const Pose& after = odometry.odometry().X_OB;

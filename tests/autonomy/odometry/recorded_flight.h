@@ -21,6 +21,7 @@ struct Recording {
   AnalyticMotion motion;
   std::vector<ImuSample> imu;
   std::vector<LidarScanPtr> scans;
+  Stamp imu_clock_offset = 0;  ///< of the stamps, ahead of the time that the samples arrive
 };
 
 /// @param stride of the scans' points
@@ -30,6 +31,9 @@ Recording record(const AnalyticWorld& world, const AnalyticMotion& motion, doubl
 
 const Recording& forest();    ///< 16 s along a loop
 const Recording& standing();  ///< a minute in a hall
+
+/// The same flight with an IMU whose gyro reads so many times too much, by a clock that is off.
+Recording with_imu(Recording recording, const Vec3& gyro_scale, Stamp clock_offset);
 
 /// What the outside sees at each IMU sample, and each scan's update.
 struct Flown {

@@ -1,15 +1,22 @@
 #include "odometry/map_drift.h"
 
+#include <algorithm>
+
 namespace arex {
 
-PoseCovariance MapDrift::met(std::span<const int> born) const {
+MapDrift::Met MapDrift::met(std::span<const int> born) const {
   std::vector<int> counts(insertions_.size(), 0);
   for (const int insertion : born) ++counts.at(static_cast<std::size_t>(insertion));
-  PoseCovariance mean = PoseCovariance::Zero();
+  Met met;
+  double age = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] > 0) mean += counts[i] / static_cast<double>(born.size()) * insertions_[i];
+    if (counts[i] == 0) continue;
+    const double share = counts[i] / static_cast<double>(born.size());
+    met.covariance += share * insertions_[i];
+    age += share * static_cast<double>(counts.size() - i);
   }
-  return mean;
+  met.age = std::max(1.0, age);
+  return met;
 }
 
 }  // namespace arex

@@ -17,19 +17,30 @@ using PoseCovariance = Eigen::Matrix<double, 6, 6>;
 /// piece of the map stands where the scan that made it was believed to be: it carries the error of
 /// the pieces that this scan was registered on, and that of the registration. So the error of the
 /// map seen now is that of the insertions which made the surfels seen now, in the mean, and what is
-/// inserted now has this and the scan's own. New ground lets the map drift; where the vehicle
-/// returns, it sees old surfels again, and the drift is gone.
+/// inserted now has this and the scan's own. As many scans as the surfels seen are old have made
+/// the piece of map that is seen together; their own errors are independent and average out in it.
+/// New ground lets the map drift; where the vehicle returns, it sees old surfels again, and the
+/// drift is gone.
 class MapDrift {
  public:
   void clear() { insertions_.clear(); }
 
-  /// The map's covariance where it is met, axes of O.
+  /// The map where a scan meets it.
+  struct Met {
+    PoseCovariance covariance = PoseCovariance::Zero();  ///< axes of O
+    double age = 1;                                      ///< mean, in insertions, at least one
+  };
   /// @param born for each matched point, the insertion that made its surfel
-  [[nodiscard]] PoseCovariance met(std::span<const int> born) const;
+  [[nodiscard]] Met met(std::span<const int> born) const;
 
   /// Number of the next insertion.
   [[nodiscard]] int next() const { return static_cast<int>(insertions_.size()); }
-  void add(const PoseCovariance& covariance) { insertions_.push_back(covariance); }
+  /// The map's first piece, which is where O is.
+  void add_first() { insertions_.push_back(PoseCovariance::Zero()); }
+  /// @param registration of the scan that is inserted, axes of O
+  void add(const Met& met, const PoseCovariance& registration) {
+    insertions_.push_back(met.covariance + registration / met.age);
+  }
 
  private:
   std::vector<PoseCovariance> insertions_;

@@ -59,10 +59,10 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
         doubtful_in_a_row_ == 0) {
       points_O = to_O(points);
       fractions = fractions_of(*job.scan, points);
-      map_covariance_ = drift_.met(update.registration.born);
+      map_met_ = drift_.met(update.registration.born);
       if (confirmations_left_ == 0) {
-        insert(points, points_O,
-               map_covariance_ + turned(update.registration.covariance, filter_.state().R_OB));
+        insert(points, points_O);
+        drift_.add(map_met_, turned(update.registration.covariance, filter_.state().R_OB));
       }
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
@@ -76,7 +76,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   update.covariance = filter_.covariance();
   const Mat3 R_BO = filter_.state().R_OB.transpose();
   update.pose_covariance = filter_.pose_covariance().topLeftCorner<6, 6>();
-  update.pose_covariance += turned(map_covariance_, R_BO);
+  update.pose_covariance += turned(map_met_.covariance, R_BO);
   update.accel_scale = accel_scale_;
   update.gyro = gyro_;
   return update;
@@ -116,7 +116,8 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
     still.end = scan->end;
     still.X_OB = filter_.state().X_OB();
     points = undistort(*scan, {still}, X_BL_, config_.lidar, body_radius_m_);
-    insert(points, to_O(points), PoseCovariance::Zero());
+    insert(points, to_O(points));
+    drift_.add_first();
   }
   // A filter that no scan can correct runs away within seconds.
   ErrorStateFilter tried = filter_;
@@ -135,7 +136,7 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
 void ScanCorrector::forget_map() {
   map_.clear();
   drift_.clear();
-  map_covariance_.setZero();
+  map_met_ = {};
 }
 
 void ScanCorrector::start_again() {
@@ -270,8 +271,8 @@ std::vector<Vec3f> ScanCorrector::to_O(const std::vector<ScanPoint>& points) con
   return points_O;
 }
 
-void ScanCorrector::insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O,
-                           const PoseCovariance& covariance) {
+void ScanCorrector::insert(const std::vector<ScanPoint>& points,
+                           const std::vector<Vec3f>& points_O) {
   std::vector<float> variances;
   variances.reserve(points.size());
   for (const ScanPoint& point : points) {
@@ -280,7 +281,6 @@ void ScanCorrector::insert(const std::vector<ScanPoint>& points, const std::vect
                                            config_.lidar.lateral_variance(range)));
   }
   map_.insert(points_O, variances, drift_.next());
-  drift_.add(covariance);
 }
 
 }  // namespace arex

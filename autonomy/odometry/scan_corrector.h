@@ -68,10 +68,7 @@ class ScanCorrector {
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
-  /// @param covariance with which the points stand in O: the map's where they were registered, and
-  /// the registration's; axes of O
-  void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O,
-              const PoseCovariance& covariance);
+  void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
   [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
 
   LidarInertialConfig config_;
@@ -81,7 +78,7 @@ class ScanCorrector {
   ErrorStateFilter filter_;
   SurfelMap map_;
   MapDrift drift_;
-  PoseCovariance map_covariance_ = PoseCovariance::Zero();  ///< of the map as last met, axes of O
+  MapDrift::Met map_met_;  ///< as of the last scan
   double accel_scale_ = 1;
   GyroCompletion gyro_;
   ImuBuffer imu_;

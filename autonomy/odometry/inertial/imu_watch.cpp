@@ -15,8 +15,8 @@ std::vector<std::string> ImuWatch::update(const NavigationState& state,
   for (int i = 0; i < 3 && !scale_told_; ++i) {
     if (!sure(state.s_g[i], kGyroScale + i, config_.gyro_scale)) continue;
     scale_told_ = true;
-    told.push_back(fmt::format("imu gyro scale {:.1f} % off about {}",
-                               100 * std::abs(state.s_g[i]), "xyz"[i]));
+    told.push_back(fmt::format("imu gyro scale {:.1f} % off about {}", 100 * std::abs(state.s_g[i]),
+                               "xyz"[i]));
   }
   const double offset = state.t_d - delay_s_;
   if (!clock_told_ && sure(offset, kTimeOffset, config_.time_offset_s)) {

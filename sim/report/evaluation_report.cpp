@@ -114,7 +114,7 @@ std::string tracks_html(const Comparison& comparison) {
   box = {box.min() - Vec2(2 * unit, 5 * unit), box.max() + Vec2::Constant(2 * unit)};
   std::string svg = fmt::format(
       "<svg id=\"path-map\" class=\"map\" role=\"img\" aria-label=\"Tracks seen from above\" "
-      "viewBox=\"%.3f %.3f %.3f %.3f\">\n",
+      "viewBox=\"{:.3f} {:.3f} {:.3f} {:.3f}\">\n",
       box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y());
   // The reference where any estimate knows it.
   const auto longest = std::max_element(

@@ -1,5 +1,7 @@
 #include "report/evaluation_report.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -85,7 +87,7 @@ class TopView {
     const std::size_t step = pairs.size() / kMaxPath + 1;
     const auto add = [&](const PosePair& pair) {
       const Vec2 p = (*this)(pair.*which);
-      points += svg_format("%.3f,%.3f ", p.x(), -p.y());
+      points += fmt::format("{:.3f},{:.3f} ", p.x(), -p.y());
     };
     for (std::size_t i = 0; i < pairs.size(); i += step) add(pairs[i]);
     add(pairs.back());
@@ -110,9 +112,9 @@ std::string tracks_html(const Comparison& comparison) {
   const double unit = std::max(1.0, box.sizes().maxCoeff()) / 80;  // what a mark measures
   // The scale bar stands below.
   box = {box.min() - Vec2(2 * unit, 5 * unit), box.max() + Vec2::Constant(2 * unit)};
-  std::string svg = svg_format(
+  std::string svg = fmt::format(
       "<svg id=\"path-map\" class=\"map\" role=\"img\" aria-label=\"Tracks seen from above\" "
-      "viewBox=\"%.3f %.3f %.3f %.3f\">\n",
+      "viewBox=\"{:.3f} {:.3f} {:.3f} {:.3f}\">\n",
       box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y());
   // The reference where any estimate knows it.
   const auto longest = std::max_element(

@@ -1,10 +1,10 @@
 #include "report/map_picture.h"
 
+#include <fmt/format.h>
 #include <png.h>
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 
@@ -125,9 +125,9 @@ std::string points_text(const std::vector<TimedPose>& poses, std::size_t most) {
   std::string points;
   const std::size_t step = poses.size() / most + 1;
   for (std::size_t i = 0; i < poses.size(); i += step) {
-    points += svg_format("%.2f,%.2f ", poses[i].X.p.x(), -poses[i].X.p.y());
+    points += fmt::format("{:.2f},{:.2f} ", poses[i].X.p.x(), -poses[i].X.p.y());
   }
-  return points + svg_format("%.2f,%.2f", poses.back().X.p.x(), -poses.back().X.p.y());
+  return points + fmt::format("{:.2f},{:.2f}", poses.back().X.p.x(), -poses.back().X.p.y());
 }
 
 std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
@@ -137,8 +137,8 @@ std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
 }
 
 std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
-  return svg_format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius,
-                    name) +
+  return fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" class=\"{}\">", x, -y,
+                     radius, name) +
          "<title>" + escape_markup(title) + "</title></circle>\n";
 }
 
@@ -153,11 +153,11 @@ std::string candidates_svg(const Table& decisions, double radius) {
     if (!std::isfinite(x[i]) || !std::isfinite(y[i]) || decisions.text(i, "verdict") != "kept") {
       continue;
     }
-    path += svg_format("M%.1f %.1fh0", x[i], -y[i]);
+    path += fmt::format("M{:.1f} {:.1f}h0", x[i], -y[i]);
   }
   if (path.empty()) return {};
-  return svg_format("<path class=\"candidates\" stroke-width=\"%.2f\" d=\"", 1.2 * radius) + path +
-         "\"/>\n";
+  return fmt::format("<path class=\"candidates\" stroke-width=\"{:.2f}\" d=\"", 1.2 * radius) +
+         path + "\"/>\n";
 }
 
 /// What a picture shows of the plane, with a rim of one mark's size.
@@ -182,13 +182,14 @@ View view_of(Eigen::AlignedBox2d box, const Backdrop& backdrop) {
 std::string open_svg(const View& view, const Backdrop& backdrop, const char* attributes) {
   const Eigen::AlignedBox2d& box = view.box;
   std::string svg =
-      svg_format(
-          "<svg class=\"map\" role=\"img\" viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\" ",
+      fmt::format(
+          "<svg class=\"map\" role=\"img\" viewBox=\"{:.2f} {:.2f} {:.2f} {:.2f}\" "
+          "data-unit=\"{:.3f}\" ",
           box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), view.unit) +
       attributes + ">\n";
   if (backdrop.width > 0) {
-    svg += svg_format(
-               "<image x=\"%.3f\" y=\"%.3f\" width=\"%.3f\" height=\"%.3f\" "
+    svg += fmt::format(
+               "<image x=\"{:.3f}\" y=\"{:.3f}\" width=\"{:.3f}\" height=\"{:.3f}\" "
                "preserveAspectRatio=\"none\" href=\"",
                backdrop.x_m, -backdrop.y_m, backdrop.width * backdrop.cell_m,
                backdrop.height * backdrop.cell_m) +
@@ -226,7 +227,7 @@ std::string map_picture_svg(const RunRecord& run) {
     svg +=
         circle(target.p_O.x(), target.p_O.y(), 0.55 * unit, target.reached ? "reached" : "target",
                "target " + std::to_string(i + 1) + ", selected at " +
-                   svg_format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
+                   fmt::format("{:.1f} s", target.time_s) + (target.reached ? ", reached" : ""));
   }
   if (!run.truth.empty()) {
     svg += svg_ends(run.truth.front().X.p.head<2>(), run.truth.back().X.p.head<2>(), unit);
@@ -250,8 +251,8 @@ std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<
     svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
            points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
     const Vec3& end = poses->back().X.p;
-    ends += svg_format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" style=\"fill:", end.x(),
-                       -end.y(), 0.6 * view.unit) +
+    ends += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:", end.x(),
+                        -end.y(), 0.6 * view.unit) +
             colour + "\">" + name + "</circle>\n";
   }
   const Vec3& start = paths.front().poses->front().X.p;

@@ -1,8 +1,8 @@
 #include "report/page.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "report/payload.h"
@@ -47,11 +47,7 @@ std::string key_figures_html(const std::vector<KeyFigure>& figures) {
   return html + "</dl>\n";
 }
 
-std::string number_text(double value, int digits) {
-  std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "%.*g", digits, value);
-  return text.data();
-}
+std::string number_text(double value, int digits) { return fmt::format("{:.{}g}", value, digits); }
 
 std::string unit_text(const std::string& unit) {
   std::string text = unit;

@@ -1,5 +1,7 @@
 #include "report/svg.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -57,11 +59,11 @@ std::vector<std::size_t> thinned(const std::vector<double>& values) {
 }
 
 std::string line(double x0, double y0, double x1, double y1) {
-  return svg_format("<path class=\"grid\" d=\"M%.1f %.1fL%.1f %.1f\"/>", x0, y0, x1, y1);
+  return fmt::format("<path class=\"grid\" d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>", x0, y0, x1, y1);
 }
 
 std::string label(double x, double y, const char* anchor, const std::string& text) {
-  return svg_format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", x, y, anchor) +
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">", x, y, anchor) +
          escape_markup(text) + "</text>\n";
 }
 
@@ -75,19 +77,20 @@ std::string svg_scale_bar(const Eigen::AlignedBox2d& box, double unit) {
   }
   const double x = box.min().x() + 1.5 * unit;
   const double y = -box.min().y() - 1.5 * unit;
-  return svg_format("<path class=\"scale\" d=\"M%.2f %.2fv%.2fh%.2fv%.2f\"/>", x, y - 0.6 * unit,
-                    0.6 * unit, length, -0.6 * unit) +
-         svg_format("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\">%g m</text>\n", x + 0.4 * unit,
-                    y - 0.5 * unit, 1.6 * unit, length);
+  return fmt::format("<path class=\"scale\" d=\"M{:.2f} {:.2f}v{:.2f}h{:.2f}v{:.2f}\"/>", x,
+                     y - 0.6 * unit, 0.6 * unit, length, -0.6 * unit) +
+         fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"{:.2f}\">{:g} m</text>\n",
+                     x + 0.4 * unit, y - 0.5 * unit, 1.6 * unit, length);
 }
 
 std::string svg_ends(const Vec2& start, const Vec2& end, double unit) {
-  return svg_format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"start\">", start.x(),
-                    -start.y(), 0.9 * unit) +
+  return fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" class=\"start\">", start.x(),
+                     -start.y(), 0.9 * unit) +
          "<title>start</title></circle>\n" +
-         svg_format("<path class=\"end\" d=\"M%.2f %.2fl%.2f %.2fm0 %.2fl%.2f %.2f\">",
-                    end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit,
-                    -1.6 * unit, -1.6 * unit, 1.6 * unit) +
+         fmt::format(
+             "<path class=\"end\" d=\"M{:.2f} {:.2f}l{:.2f} {:.2f}m0 {:.2f}l{:.2f} {:.2f}\">",
+             end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit, -1.6 * unit,
+             -1.6 * unit, 1.6 * unit) +
          "<title>end</title></path>\n";
 }
 
@@ -114,24 +117,24 @@ std::string chart_html(const std::string& title, const std::string& x_label,
   const auto up = [&](double value) {
     return kHeight - kBottom - value / y.end() * (kHeight - kBottom - kTop);
   };
-  std::string svg =
-      svg_format("<svg class=\"curves\" role=\"img\" viewBox=\"0 0 %g %g\" ", kWidth, kHeight) +
-      "aria-label=\"" + escape_markup(title) + "\">\n";
+  std::string svg = fmt::format("<svg class=\"curves\" role=\"img\" viewBox=\"0 0 {:g} {:g}\" ",
+                                kWidth, kHeight) +
+                    "aria-label=\"" + escape_markup(title) + "\">\n";
   for (int i = 0; i <= x.steps; ++i) {
     const double at = across(i * x.step);
     svg += line(at, kTop, at, kHeight - kBottom);
-    svg += label(at, kHeight - kBottom + 15, "middle", svg_format("%g", i * x.step));
+    svg += label(at, kHeight - kBottom + 15, "middle", fmt::format("{:g}", i * x.step));
   }
   for (int i = 0; i <= y.steps; ++i) {
     const double at = up(i * y.step);
     svg += line(kLeft, at, kWidth - kRight, at);
-    svg += label(kLeft - 6, at + 4, "end", svg_format("%g", i * y.step));
+    svg += label(kLeft - 6, at + 4, "end", fmt::format("{:g}", i * y.step));
   }
   for (std::size_t n = 0; n < curves.size(); ++n) {
     const Curve& curve = curves[n];
     std::string points;
     for (const std::size_t i : thinned(curve.y)) {
-      points += svg_format("%.1f,%.1f ", across(curve.x[i]), up(curve.y[i]));
+      points += fmt::format("{:.1f},{:.1f} ", across(curve.x[i]), up(curve.y[i]));
     }
     svg += "<polyline class=\"" + svg_line_class(n) + "\" points=\"" + points + "\"><title>" +
            escape_markup(curve.label) + "</title></polyline>\n";

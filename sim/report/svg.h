@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -11,14 +9,6 @@
 /// Drawings that stand in a page as they are, without a script. Their colours are those of
 /// scripts/report/src/style.css.
 namespace arex::sim {
-
-/// Numbers in a pattern of printf.
-template <typename... Numbers>
-std::string svg_format(const char* pattern, Numbers... numbers) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, numbers...);
-  return text.data();
-}
 
 /// A bar of a round length, m, in the lower left corner of a map whose y axis points up.
 /// @param unit what a mark measures

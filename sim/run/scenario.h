@@ -65,7 +65,8 @@ struct ScenarioConfig {
     f("depth", depth, "D430");
     f("mocap", mocap, "motion capture, where odometry.source is that");
     f("devices", devices,
-      "further ones by name: {type: mid360|d430, position_m: [..], rotation_rad: [..], ...}");
+      "further ones by name: {type: mid360|spinning|d430, position_m: [..], rotation_rad: [..], "
+      "...}");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
     f("scoring", scoring, "what the truth is compared with");

@@ -83,8 +83,8 @@ std::vector<FigureInfo> exploration_figures() {
   return {
       {"exploration.decisions", "decisions of the explorer", "", kNeither, false,
        "of explorations; null if it was never asked"},
-      {"exploration.targets", "targets issued", "", kNeither, false,
-       "the same as targets_issued, its older name"},
+      {"exploration.targets", "targets issued (older name)", "", kNeither, false,
+       "the same as exploration.targets_issued"},
       {"exploration.targets_issued", "targets issued", "", kNeither, false,
        "by the explorer: decisions for a new one"},
       {"exploration.targets_seen", "targets seen on the way", "", kNeither, false,

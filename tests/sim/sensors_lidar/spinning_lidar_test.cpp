@@ -13,24 +13,16 @@
 namespace arex::sim {
 namespace {
 
+using test::kRoomHalf;
 using test::rest;
+using test::room;
+using test::to_wall;
 using test::WorldMaker;
 
 SpinningLidarConfig exact() {
   SpinningLidarConfig config;
   config.noise_free = true;
   return config;
-}
-
-const Vec3 kRoomHalf(9, 7, 5);
-worlds::World room() { return WorldMaker().object(0.6F).box(Pose{}, kRoomHalf).world(); }
-
-double to_wall(const Vec3& o, const Vec3& d) {
-  double best = 1e9;
-  for (int i = 0; i < 3; ++i) {
-    if (d[i] != 0) best = std::min(best, (std::copysign(kRoomHalf[i], d[i]) - o[i]) / d[i]);
-  }
-  return best;
 }
 
 // The maker's arithmetic: 1800 columns a turn at 10 Hz, 16 lasers from -15 to 15 degrees, 2 apart.

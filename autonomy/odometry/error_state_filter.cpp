@@ -54,9 +54,10 @@ void ErrorStateFilter::reset(const NavigationState& x, const ErrorMatrix& P) {
   P_ = P;
 }
 
-void ErrorStateFilter::predict(const ImuInterval& imu) {
+void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
   const double dt = imu.dt_s();
-  const PropagationJacobians jacobians = propagation_jacobians(x_, imu);
+  PropagationJacobians jacobians = propagation_jacobians(x_, imu);
+  if (standing) jacobians.F.col(kTimeOffset).head<kTimeOffset>().setZero();
   Eigen::Matrix<double, kNoiseDim, 1> Q;
   const Vec3 rate = x_.rate(imu.mean_gyro());
   for (int i = 0; i < 3; ++i) {

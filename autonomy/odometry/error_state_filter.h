@@ -27,7 +27,9 @@ class ErrorStateFilter {
   [[nodiscard]] const ErrorMatrix& covariance() const { return P_; }
 
   /// Propagates state and covariance over one IMU interval (paper, eq. (2)).
-  void predict(const ImuInterval& imu);
+  /// @param standing nothing moves: how the readings change is noise, and says nothing of when they
+  /// were taken
+  void predict(const ImuInterval& imu, bool standing = false);
 
   /// One iteration of an update around `x`, the iterate: where the residuals' information and the
   /// prior (state() and covariance()) agree. Returns the next iterate.

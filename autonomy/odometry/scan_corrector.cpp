@@ -193,7 +193,7 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
     gyro_.complete(imu);
     clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));
-    filter_.predict(imu);
+    filter_.predict(imu, stood_at_.has_value());
   }
   return segments;
 }

@@ -104,7 +104,7 @@ class Outputs {
              const std::filesystem::path& folder, sim::Simulation& simulation) {
     if (!arguments.bag.empty()) {
       bag_.emplace(arguments.bag, scenario.config.stack.vehicle, sim::BagCompression::kNone,
-                   scenario.config.lidar.misses_in_bag);
+                   scenario.config.lidar.model.misses_in_bag);
     }
     recorder_.emplace(folder, scenario.resolved_yaml());
     simulation.record_to(*recorder_);

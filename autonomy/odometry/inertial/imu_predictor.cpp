@@ -37,9 +37,15 @@ std::optional<NavigationState> ImuPredictor::at(Stamp stamp) const {
 
 void ImuPredictor::advance() {
   if (!head_ || samples_.empty()) return;
-  // Not to where the newest reading would have to be held, which the next one is better for; nor
-  // further than is asked for.
-  const Stamp to = samples_.back().stamp - std::max<Stamp>(0, from_seconds(head_->t_d));
+  // To where a reading was taken, so that no interval is cut; not to where the newest would have to
+  // be held, nor further than is asked for.
+  const Stamp delay = from_seconds(head_->t_d);
+  const Stamp newest = samples_.back().stamp;
+  const auto after =
+      std::upper_bound(samples_.begin(), samples_.end(), newest + std::min<Stamp>(0, delay),
+                       [](Stamp t, const ImuSample& s) { return t < s.stamp; });
+  if (after == samples_.begin()) return;
+  const Stamp to = (after - 1)->stamp - delay;
   if (to <= head_stamp_) return;
   head_ = integrate(to);
   head_stamp_ = to;

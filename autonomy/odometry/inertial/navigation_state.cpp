@@ -74,6 +74,34 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
   accel = accel_scale * (a.accel_mps2 + s * (b.accel_mps2 - a.accel_mps2));
 }
 
+/// How the readings change over the intervals, by a straight line through them. Its weights are odd
+/// about the middle, those of the integral even: so the noise of the slope is none of the turn that
+/// is integrated, and an estimate of the delay that compares both is not drawn to what is noise.
+void add_slopes(std::vector<ImuInterval>& intervals) {
+  const Stamp origin = intervals.front().begin;
+  const auto middle_s = [&](const ImuInterval& imu) {
+    return to_seconds(imu.begin - origin) + 0.5 * imu.dt_s();
+  };
+  double total_s = 0, mean_s = 0, spread = 0;
+  for (const ImuInterval& imu : intervals) {
+    total_s += imu.dt_s();
+    mean_s += imu.dt_s() * middle_s(imu);
+  }
+  mean_s /= total_s;
+  Vec3 gyro = Vec3::Zero(), accel = Vec3::Zero();
+  for (const ImuInterval& imu : intervals) {
+    const double lever = imu.dt_s() * (middle_s(imu) - mean_s);
+    spread += lever * (middle_s(imu) - mean_s);
+    gyro += lever * imu.mean_gyro();
+    accel += lever * imu.mean_accel();
+  }
+  if (intervals.size() < 2) return;
+  for (ImuInterval& imu : intervals) {
+    imu.gyro_slope = gyro / spread;
+    imu.accel_slope = accel / spread;
+  }
+}
+
 }  // namespace
 
 std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp from, Stamp to,
@@ -97,6 +125,7 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
     interval.accel_begin = interval.accel_end;
     if (next != samples.end()) ++next;
   }
+  add_slopes(intervals);
   for (ImuInterval& covered : intervals) {
     covered.begin -= delay;
     covered.end -= delay;
@@ -134,9 +163,8 @@ PropagationJacobians propagation_jacobians(const NavigationState& x, const ImuIn
   const Vec3 scale = Vec3::Ones() + x.s_g;
   const Mat3 turn_by_gyro_bias = -A_T_dt * scale.asDiagonal();
   const Mat3 turn_by_gyro_scale = A_T_dt * (imu.mean_gyro() - x.b_g).asDiagonal();
-  const Vec3 turn_by_time = A_T_dt * scale.cwiseProduct(imu.gyro_end - imu.gyro_begin) / dt;
-  const Vec3 a_by_time =
-      a_by_turn * turn_by_time - a_by_accel_bias * (imu.accel_end - imu.accel_begin) / dt;
+  const Vec3 turn_by_time = A_T_dt * scale.cwiseProduct(imu.gyro_slope);
+  const Vec3 a_by_time = a_by_turn * turn_by_time - a_by_accel_bias * imu.accel_slope;
 
   PropagationJacobians out;
   ErrorMatrix& F = out.F;

@@ -71,10 +71,13 @@ struct ImuInterval {
   Stamp end = 0;
   Vec3 gyro_begin, gyro_end;           ///< rad/s
   Vec3 accel_begin, accel_end;         ///< m/s^2
+  Vec3 gyro_slope = Vec3::Zero();      ///< of the readings over all intervals at once, rad/s^2
+  Vec3 accel_slope = Vec3::Zero();     ///< m/s^3
   std::array<bool, 3> gyro_clipped{};  ///< axes of the gyro at their full scale
 
   [[nodiscard]] double dt_s() const { return to_seconds(end - begin); }
   [[nodiscard]] Vec3 mean_gyro() const { return 0.5 * (gyro_begin + gyro_end); }
+  [[nodiscard]] Vec3 mean_accel() const { return 0.5 * (accel_begin + accel_end); }
 };
 
 /// The intervals between the samples that cover [from, to], the first and the last cut to fit.

@@ -61,8 +61,8 @@ TEST(ErrorStateFilter, WithoutDoubtTheExtrinsicsStay) {
   RandomStream random(1, "update");
   ErrorStateFilter filter(ImuNoiseConfig{});
   ErrorMatrix P = random_covariance(random, 0.1);
-  P.bottomRows<6>().setZero();
-  P.rightCols<6>().setZero();
+  P.middleRows<6>(kExtrinsicRotation).setZero();
+  P.middleCols<6>(kExtrinsicRotation).setZero();
   filter.reset(NavigationState{}, P);
   PoseInformation information;
   for (int i = 0; i < 50; ++i) {

@@ -144,7 +144,8 @@ TEST(LidarInertialOdometry, TheFastOutputIsAsGoodAsTheScans) {
   for (const Odometry& o : run.fast) {
     if (o.status != OdometryStatus::kOk) continue;
     worst = std::max(worst, position_error(forest(), o.stamp, o.X_OB.p));
-    EXPECT_LE(o.stamp - o.correction_stamp, kFrame + 20'000'000);
+    // And what the IMU's clock is believed to be off.
+    EXPECT_LE(o.stamp - o.correction_stamp, kFrame + 20'000'000 + 5'000'000);
   }
   EXPECT_LT(worst, worst_error(forest(), run) + 0.01);
 }
@@ -204,7 +205,8 @@ TEST(LidarInertialOdometry, LatencyChangesWhenNotWhat) {
   int compared = 0;
   for (std::size_t i = 0; i < now.fast.size(); ++i) {
     if (now.fast[i].status == OdometryStatus::kInitialising ||
-        now.fast[i].correction_stamp != late.fast[i].correction_stamp) {
+        now.fast[i].correction_stamp != late.fast[i].correction_stamp ||
+        now.fast[i].stamp != late.fast[i].stamp) {
       continue;
     }
     ++compared;
@@ -365,7 +367,8 @@ TEST(LidarInertialOdometry, AKnownDelayOfTheImuCostsNothing) {
       prompt.add_imu(forest().imu[j++]);
     }
     const ScanUpdate a = odometry.add_scan(scan), b = prompt.add_scan(scan);
-    EXPECT_EQ(a.state.p_OB, b.state.p_OB);
+    // What little differs comes of when the standing vehicle was seen to move.
+    EXPECT_LT((a.state.p_OB - b.state.p_OB).norm(), 2e-3);
   }
   // The output is for the stamp of the sample: the newest reading is held over the delay.
   const Odometry& out = odometry.odometry();

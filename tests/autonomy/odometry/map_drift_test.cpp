@@ -29,8 +29,8 @@ TEST(MapDrift, IsGoneWhereTheVehicleReturns) {
   EXPECT_EQ(drift.met({}).age, 1);
 }
 
-// Errors drawn for a vehicle that always sees the last few insertions: the map is off by the mean of
-// theirs, and grows by the scan's own.
+// Errors drawn for a vehicle that always sees the last few insertions: the map is off by the mean
+// of theirs, and grows by the scan's own.
 TEST(MapDrift, IsThatOfAChainOfScans) {
   constexpr int kScans = 300, kRuns = 1000;
   for (const int seen : {1, 4, 15}) {

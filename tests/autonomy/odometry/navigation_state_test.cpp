@@ -36,14 +36,15 @@ ImuInterval random_interval(RandomStream& random, Stamp dt) {
   imu.gyro_end = imu.gyro_begin + 0.2 * random.normal3();
   imu.accel_begin = Vec3(0, 0, kGravity) + 3 * random.normal3();
   imu.accel_end = imu.accel_begin + 0.5 * random.normal3();
+  imu.gyro_slope = (imu.gyro_end - imu.gyro_begin) / imu.dt_s();
+  imu.accel_slope = (imu.accel_end - imu.accel_begin) / imu.dt_s();
   return imu;
 }
 
 /// What the readings of an interval are if they are taken that much later: they change as they do
 /// inside it.
 ImuInterval later(ImuInterval imu, double seconds) {
-  const Vec3 gyro = (imu.gyro_end - imu.gyro_begin) / imu.dt_s() * seconds;
-  const Vec3 accel = (imu.accel_end - imu.accel_begin) / imu.dt_s() * seconds;
+  const Vec3 gyro = imu.gyro_slope * seconds, accel = imu.accel_slope * seconds;
   imu.gyro_begin += gyro;
   imu.gyro_end += gyro;
   imu.accel_begin += accel;

@@ -175,7 +175,6 @@ TEST(SurfelMap, KeepsToItsMemoryAndForgetsWhatItLongHasNotSeen) {
   SurfelMapConfig config;
   config.capacity = 1000;
   SurfelMap map(config);
-  const std::size_t bytes = map.memory_bytes();
   RandomStream random(1, "walk");
   const auto patch = [&](double x) {  // a floor of 2 m x 2 m at x
     Cloud cloud;
@@ -185,11 +184,13 @@ TEST(SurfelMap, KeepsToItsMemoryAndForgetsWhatItLongHasNotSeen) {
     }
     map.insert(cloud.points, cloud.variances);
   };
-  for (int i = 0; i < 100; ++i) patch(2.0 * i);
+  for (int i = 0; i < 80; ++i) patch(2.0 * i);
+  const std::size_t bytes = map.memory_bytes();  // all levels are full
+  for (int i = 80; i < 160; ++i) patch(2.0 * i);
   EXPECT_EQ(map.memory_bytes(), bytes);
   EXPECT_LE(map.cells(0), 1000U);
-  EXPECT_TRUE(map.find({199, 1, 0.01}).has_value());
-  EXPECT_EQ(map.find({199, 1, 0.01}).has_value(), true);
+  EXPECT_TRUE(map.find({319, 1, 0.01}).has_value());
+  EXPECT_EQ(map.find({319, 1, 0.01}).has_value(), true);
   const auto old = map.find({1, 1, 0.01});
   EXPECT_TRUE(!old || old->level > 0);  // the finest level had to make room
 }

@@ -22,7 +22,7 @@ struct Odometry {
   Pose X_OB;
   Vec3 v_OB = Vec3::Zero();    ///< m/s, in O
   Vec3 w_OB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
-  /// Of [rotation in B, position in O], rad and m, at the newest correction; zero: not known.
+  /// Of [rotation in B, position in O], rad and m; zero: not known.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   OdometryStatus status = OdometryStatus::kInitialising;
 };

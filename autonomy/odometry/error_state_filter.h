@@ -22,6 +22,7 @@ class ErrorStateFilter {
   explicit ErrorStateFilter(const ImuNoiseConfig& noise) : noise_(noise) {}
 
   void reset(const NavigationState& x, const ErrorMatrix& P);
+  [[nodiscard]] const ImuNoiseConfig& noise() const { return noise_; }
   void set_noise(const ImuNoiseConfig& noise) { noise_ = noise; }
   [[nodiscard]] const NavigationState& state() const { return x_; }
   [[nodiscard]] const ErrorMatrix& covariance() const { return P_; }

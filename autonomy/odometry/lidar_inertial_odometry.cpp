@@ -33,7 +33,10 @@ void LidarInertialOdometry::apply(const ScanUpdate& update) {
   scan_status_ = update.status;
   scan_need_ = update.need;
   odometry_.correction_stamp = update.correction_stamp;
-  odometry_.covariance = update.pose_covariance;
+  corrected_ = update.pose_covariance;
+  corrected_velocity_ = update.covariance.block<3, 3>(kVelocity, kVelocity);
+  imu_noise_ = update.imu_noise;
+  corrected_at_ = update.stamp;
   if (update.status == OdometryStatus::kInitialising) {
     predictor_ = {};  // of a start that is taken back
     odometry_.status = update.status;
@@ -67,12 +70,23 @@ void LidarInertialOdometry::publish() {
   odometry_.X_OB = state->X_OB();
   odometry_.v_OB = state->v_OB;
   odometry_.w_OB_B = state->rate(newest_.gyro_radps);
+  odometry_.covariance = covariance_at(odometry_.stamp);
   const double silence_s = to_seconds(odometry_.stamp - odometry_.correction_stamp);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
   } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {
     odometry_.status = OdometryStatus::kDegenerate;
   }
+}
+
+PoseCovariance LidarInertialOdometry::covariance_at(Stamp stamp) const {
+  const double dt = std::max(0.0, to_seconds(stamp - corrected_at_));
+  PoseCovariance covariance = corrected_;
+  covariance.topLeftCorner<3, 3>() += dt * imu_noise_.gyro * imu_noise_.gyro * Mat3::Identity();
+  covariance.bottomRightCorner<3, 3>() +=
+      dt * dt * corrected_velocity_ +
+      dt * dt * dt / 3 * imu_noise_.accel * imu_noise_.accel * Mat3::Identity();
+  return covariance;
 }
 
 }  // namespace arex

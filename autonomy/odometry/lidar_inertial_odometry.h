@@ -52,6 +52,8 @@ class LidarInertialOdometry {
 
  private:
   void publish();
+  /// The covariance at the newest update, and what the IMU's noise has added since.
+  [[nodiscard]] PoseCovariance covariance_at(Stamp stamp) const;
 
   OdometryHealthConfig health_;
   ScanCorrector corrector_;
@@ -60,6 +62,10 @@ class LidarInertialOdometry {
   GyroFullScale full_scale_;
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;
+  PoseCovariance corrected_ = PoseCovariance::Zero();  ///< at the newest update
+  Mat3 corrected_velocity_ = Mat3::Zero();             ///< covariance likewise
+  WhiteNoise imu_noise_;
+  Stamp corrected_at_ = 0;
   OdometryStatus scan_status_ = OdometryStatus::kInitialising;
   OdometryNeed scan_need_ = OdometryNeed::kScan;
   Odometry odometry_;

@@ -20,7 +20,7 @@ using PoseCovariance = Eigen::Matrix<double, 6, 6>;
 /// inserted now has this and the scan's own. As many scans as the surfels seen are old have made
 /// the piece of map that is seen together; their own errors are independent and average out in it.
 /// New ground lets the map drift; where the vehicle returns, it sees old surfels again, and the
-/// drift is gone.
+/// drift is gone. A piece that is turned shifts whatever lies away from where the vehicle was.
 class MapDrift {
  public:
   void clear() { insertions_.clear(); }
@@ -31,19 +31,24 @@ class MapDrift {
     double age = 1;                                      ///< mean, in insertions, at least one
   };
   /// @param born for each matched point, the insertion that made its surfel
-  [[nodiscard]] Met met(std::span<const int> born) const;
+  /// @param p_OB where the vehicle is, m
+  [[nodiscard]] Met met(std::span<const int> born, const Vec3& p_OB) const;
 
   /// Number of the next insertion.
   [[nodiscard]] int next() const { return static_cast<int>(insertions_.size()); }
   /// The map's first piece, which is where O is.
-  void add_first() { insertions_.push_back(PoseCovariance::Zero()); }
+  void add_first() { insertions_.push_back({}); }
   /// @param registration of the scan that is inserted, axes of O
-  void add(const Met& met, const PoseCovariance& registration) {
-    insertions_.push_back(met.covariance + registration / met.age);
+  void add(const Met& met, const PoseCovariance& registration, const Vec3& p_OB) {
+    insertions_.push_back({met.covariance + registration / met.age, p_OB});
   }
 
  private:
-  std::vector<PoseCovariance> insertions_;
+  struct Insertion {
+    PoseCovariance covariance = PoseCovariance::Zero();
+    Vec3 p_OB = Vec3::Zero();  ///< of the vehicle
+  };
+  std::vector<Insertion> insertions_;
 };
 
 }  // namespace arex

@@ -59,10 +59,11 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
         doubtful_in_a_row_ == 0) {
       points_O = to_O(points);
       fractions = fractions_of(*job.scan, points);
-      map_met_ = drift_.met(update.registration.born);
+      map_met_ = drift_.met(update.registration.born, filter_.state().p_OB);
       if (confirmations_left_ == 0) {
         insert(points, points_O);
-        drift_.add(map_met_, turned(update.registration.covariance, filter_.state().R_OB));
+        drift_.add(map_met_, turned(update.registration.covariance, filter_.state().R_OB),
+                   filter_.state().p_OB);
       }
     }
     update.points_O = std::make_shared<const std::vector<Vec3f>>(std::move(points_O));
@@ -77,6 +78,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   const Mat3 R_BO = filter_.state().R_OB.transpose();
   update.pose_covariance = filter_.pose_covariance().topLeftCorner<6, 6>();
   update.pose_covariance += turned(map_met_.covariance, R_BO);
+  update.imu_noise = {filter_.noise().gyro_noise_density, filter_.noise().accel_noise_density};
   update.accel_scale = accel_scale_;
   update.gyro = gyro_;
   return update;

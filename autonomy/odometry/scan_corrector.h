@@ -34,6 +34,7 @@ struct ScanUpdate {
   ErrorMatrix covariance = ErrorMatrix::Zero();  ///< the filter's, on the map as it is
   PoseCovariance pose_covariance =
       PoseCovariance::Zero();  ///< in B and O, the map's error included
+  WhiteNoise imu_noise;        ///< densities that the filter now believes
   double accel_scale = 1;
   GyroCompletion gyro;        ///< of the axes that are clipped
   bool gyro_clipped = false;  ///< during this scan

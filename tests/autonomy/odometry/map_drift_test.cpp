@@ -8,25 +8,48 @@ namespace arex {
 namespace {
 
 const PoseCovariance kScan = 1e-6 * PoseCovariance::Identity();
+const Vec3 kHere = Vec3::Zero();
 
 TEST(MapDrift, GrowsByEveryRegistrationOnTheOneBefore) {
   MapDrift drift;
   drift.add_first();
   for (int scan = 1; scan <= 50; ++scan) {
     const std::vector<int> born(20, drift.next() - 1);
-    drift.add(drift.met(born), kScan);
+    drift.add(drift.met(born, kHere), kScan, kHere);
   }
-  EXPECT_NEAR(drift.met(std::vector<int>{50}).covariance(0, 0), 50 * kScan(0, 0), 1e-12);
+  EXPECT_NEAR(drift.met(std::vector<int>{50}, kHere).covariance(0, 0), 50 * kScan(0, 0), 1e-12);
 }
 
 TEST(MapDrift, IsGoneWhereTheVehicleReturns) {
   MapDrift drift;
   drift.add_first();
-  for (int scan = 1; scan <= 50; ++scan) drift.add(drift.met(std::vector<int>{scan - 1}), kScan);
-  EXPECT_TRUE(drift.met(std::vector<int>{0, 0, 0}).covariance.isZero());
-  EXPECT_NEAR(drift.met(std::vector<int>{0, 50}).covariance(3, 3), 25 * kScan(3, 3), 1e-12);
-  EXPECT_TRUE(drift.met({}).covariance.isZero());
-  EXPECT_EQ(drift.met({}).age, 1);
+  for (int scan = 1; scan <= 50; ++scan)
+    drift.add(drift.met(std::vector<int>{scan - 1}, kHere), kScan, kHere);
+  EXPECT_TRUE(drift.met(std::vector<int>{0, 0, 0}, kHere).covariance.isZero());
+  EXPECT_NEAR(drift.met(std::vector<int>{0, 50}, kHere).covariance(3, 3), 25 * kScan(3, 3), 1e-12);
+  EXPECT_TRUE(drift.met({}, kHere).covariance.isZero());
+  EXPECT_EQ(drift.met({}, kHere).age, 1);
+}
+
+// A vehicle that flies straight on and errs by its heading alone: each error swings what comes
+// after.
+TEST(MapDrift, SwingsWhatLiesAhead) {
+  constexpr double kStep = 0.2, kHeadingVariance = 1e-8;
+  constexpr int kScans = 100;
+  PoseCovariance heading = PoseCovariance::Zero();
+  heading(2, 2) = kHeadingVariance;
+  MapDrift drift;
+  drift.add_first();
+  double expected = 0;
+  for (int scan = 1; scan <= kScans; ++scan) {
+    const Vec3 p_OB(kStep * scan, 0, 0);
+    drift.add(drift.met(std::vector<int>{scan - 1}, p_OB), heading, p_OB);
+    expected += std::pow(kStep * (kScans - scan), 2) * kHeadingVariance;
+  }
+  const MapDrift::Met met = drift.met(std::vector<int>{kScans}, {kStep * kScans, 0, 0});
+  EXPECT_NEAR(met.covariance(4, 4), expected, 1e-9 * expected);
+  EXPECT_NEAR(met.covariance(2, 2), kScans * kHeadingVariance, 1e-12);
+  EXPECT_EQ(met.covariance(3, 3), 0);
 }
 
 // Errors drawn for a vehicle that always sees the last few insertions: the map is off by the mean
@@ -42,7 +65,7 @@ TEST(MapDrift, IsThatOfAChainOfScans) {
     MapDrift drift;
     drift.add_first();
     for (int scan = 1; scan <= kScans; ++scan) {
-      drift.add(drift.met(born_of(scan)), PoseCovariance::Identity());
+      drift.add(drift.met(born_of(scan), kHere), PoseCovariance::Identity(), kHere);
     }
     double variance = 0;
     for (int run = 0; run < kRuns; ++run) {
@@ -57,7 +80,7 @@ TEST(MapDrift, IsThatOfAChainOfScans) {
       for (const int i : born_of(kScans + 1)) met += error[static_cast<std::size_t>(i)] / seen;
       variance += met * met / kRuns;
     }
-    const double predicted = drift.met(born_of(kScans + 1)).covariance(0, 0);
+    const double predicted = drift.met(born_of(kScans + 1), kHere).covariance(0, 0);
     EXPECT_NEAR(predicted / variance, 1, 0.25) << seen;
   }
 }

@@ -7,6 +7,9 @@
 namespace arex {
 namespace {
 
+/// Of a reading that is held while the vehicle goes on, m/s^2/sqrt(Hz).
+constexpr double kHeldAccelNoise = 1;
+
 using PoseColumns = Eigen::Matrix<double, kErrorDim, PoseInformation::kDim>;
 /// First index in the error state of each block of a PoseInformation.
 constexpr std::array<int, 4> kPoseBlocks{kRotation, kPosition, kExtrinsicRotation,
@@ -62,11 +65,12 @@ void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
   const Vec3 rate = x_.rate(imu.mean_gyro());
   for (int i = 0; i < 3; ++i) {
     const double gyro =
-        imu.gyro_clipped[static_cast<std::size_t>(i)]
+        imu.held || imu.gyro_clipped[static_cast<std::size_t>(i)]
             ? noise_.clipped_gyro_noise_density
             : std::hypot(noise_.gyro_noise_density, noise_.gyro_scale_noise_density * rate.norm());
     Q[i] = gyro * gyro / dt;
-    Q[3 + i] = noise_.accel_noise_density * noise_.accel_noise_density / dt;
+    const double accel = imu.held ? kHeldAccelNoise : noise_.accel_noise_density;
+    Q[3 + i] = accel * accel / dt;
     Q[6 + i] = noise_.gyro_walk_density * noise_.gyro_walk_density / dt;
     Q[9 + i] = noise_.accel_walk_density * noise_.accel_walk_density / dt;
   }

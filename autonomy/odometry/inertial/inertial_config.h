@@ -8,7 +8,7 @@ namespace arex {
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
   double delay_std_s = 0.03;                ///< 1 sigma of that before take-off
-  double delay_walk_density = 1e-5;         ///< s/sqrt(s)
+  double delay_walk_density = 2e-4;         ///< s/sqrt(s)
   double gyro_scale_std = 0.02;             ///< 1 sigma of the scale's error before take-off
   double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
   double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
@@ -24,7 +24,9 @@ struct ImuNoiseConfig {
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added. Estimated from there on");
     f("delay_std_s", delay_std_s,
       "1 sigma of the delay before take-off: clocks that nobody synchronised; 0 takes it as known");
-    f("delay_walk_density", delay_walk_density, "s/sqrt(s), walk of the delay");
+    f("delay_walk_density", delay_walk_density,
+      "s/sqrt(s), walk of the delay: what was learned of it while it was far off is forgotten in "
+      "some ten seconds");
     f("gyro_scale_std", gyro_scale_std,
       "1 sigma of the gyro's scale error before take-off (ICM-42688-P: 0.5 %; its mounting and "
       "worse devices more); 0 takes the scale as known");

@@ -1,6 +1,7 @@
 #include "odometry/inertial/navigation_state.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "math/so3.h"
 
@@ -83,19 +84,22 @@ void add_slopes(std::vector<ImuInterval>& intervals) {
     return to_seconds(imu.begin - origin) + 0.5 * imu.dt_s();
   };
   double total_s = 0, mean_s = 0, spread = 0;
-  for (const ImuInterval& imu : intervals) {
+  std::vector<ImuInterval> read;
+  std::copy_if(intervals.begin(), intervals.end(), std::back_inserter(read),
+               [](const ImuInterval& imu) { return !imu.held; });
+  if (read.size() < 2) return;
+  for (const ImuInterval& imu : read) {
     total_s += imu.dt_s();
     mean_s += imu.dt_s() * middle_s(imu);
   }
   mean_s /= total_s;
   Vec3 gyro = Vec3::Zero(), accel = Vec3::Zero();
-  for (const ImuInterval& imu : intervals) {
+  for (const ImuInterval& imu : read) {
     const double lever = imu.dt_s() * (middle_s(imu) - mean_s);
     spread += lever * (middle_s(imu) - mean_s);
     gyro += lever * imu.mean_gyro();
     accel += lever * imu.mean_accel();
   }
-  if (intervals.size() < 2) return;
   for (ImuInterval& imu : intervals) {
     imu.gyro_slope = gyro / spread;
     imu.accel_slope = accel / spread;
@@ -106,6 +110,7 @@ void add_slopes(std::vector<ImuInterval>& intervals) {
 
 std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp from, Stamp to,
                                        double accel_scale, double delay_s) {
+  constexpr Stamp kJitter = kNanosecondsPerSecond / 200;
   std::vector<ImuInterval> intervals;
   if (to <= from) return intervals;
   const Stamp delay = from_seconds(delay_s);
@@ -119,6 +124,7 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
   while (interval.begin < to) {
     interval.end = next == samples.end() ? to : std::min(next->stamp, to);
     read_imu(samples, interval.end, accel_scale, interval.gyro_end, interval.accel_end);
+    interval.held = interval.begin >= samples.back().stamp && to - samples.back().stamp > kJitter;
     intervals.push_back(interval);
     interval.begin = interval.end;
     interval.gyro_begin = interval.gyro_end;

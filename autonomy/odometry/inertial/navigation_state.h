@@ -74,6 +74,7 @@ struct ImuInterval {
   Vec3 gyro_slope = Vec3::Zero();      ///< of the readings over all intervals at once, rad/s^2
   Vec3 accel_slope = Vec3::Zero();     ///< m/s^3
   std::array<bool, 3> gyro_clipped{};  ///< axes of the gyro at their full scale
+  bool held = false;                   ///< for want of newer readings, for longer than jitter
 
   [[nodiscard]] double dt_s() const { return to_seconds(end - begin); }
   [[nodiscard]] Vec3 mean_gyro() const { return 0.5 * (gyro_begin + gyro_end); }

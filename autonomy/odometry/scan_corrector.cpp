@@ -28,6 +28,18 @@ PoseCovariance turned(const PoseCovariance& covariance, const Mat3& R) {
   return T * covariance * T.transpose();
 }
 
+/// What the IMU's noise inside a scan, which undistortion takes for motion, makes of the whole
+/// scan: the mean of a random walk, in the rotation and, twice integrated, in the position.
+PoseCovariance distortion(const ImuNoiseConfig& noise, double scan_s) {
+  PoseCovariance covariance = PoseCovariance::Zero();
+  const double rotation = noise.gyro_noise_density * noise.gyro_noise_density * scan_s / 3;
+  const double position =
+      noise.accel_noise_density * noise.accel_noise_density * scan_s * scan_s * scan_s / 20;
+  covariance.diagonal().head<3>().setConstant(rotation);
+  covariance.diagonal().tail<3>().setConstant(position);
+  return covariance;
+}
+
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -62,7 +74,9 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
       map_met_ = drift_.met(update.registration.born, filter_.state().p_OB);
       if (confirmations_left_ == 0) {
         insert(points, points_O);
-        drift_.add(map_met_, turned(update.registration.covariance, filter_.state().R_OB),
+        drift_.add(map_met_,
+                   turned(update.registration.covariance, filter_.state().R_OB) +
+                       distortion(filter_.noise(), to_seconds(job.scan->end - job.scan->stamp)),
                    filter_.state().p_OB);
       }
     }

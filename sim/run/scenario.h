@@ -12,7 +12,9 @@
 #include "physics/physics_config.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
+#include "scoring/semantic_score.h"
 #include "scoring/thin_branches.h"
+#include "semantics/semantic_config.h"
 #include "sensors/d430.h"
 #include "sensors/imu.h"
 #include "sensors/mid360.h"
@@ -44,6 +46,7 @@ struct ScoringConfig {
   CoverageConfig coverage;
   MapErrorConfig map;
   ThinBranchConfig thin;
+  SemanticScoreConfig semantic;
 
   void fields(auto& f) {
     f("low_m", low_m, "lower edge of the space that counts as reachable, z in O");
@@ -51,7 +54,19 @@ struct ScoringConfig {
     f("coverage", coverage, "coverage of the reachable, visible truth");
     f("map", map, "distance of the map from the true surfaces");
     f("thin", thin, "thin branches seen in time");
+    f("semantic", semantic, "the semantic map against the world");
     f.check(low_m < high_m, "low_m < high_m");
+  }
+};
+
+/// The semantic map that an exploration ends with.
+struct MissionSemanticsConfig {
+  bool enabled = true;
+  SemanticConfig map;
+
+  void fields(auto& f) {
+    f("enabled", enabled, "explorations end with a semantic map of their cloud");
+    map.fields(f);
   }
 };
 
@@ -67,6 +82,7 @@ struct ScenarioConfig {
   DeviceConfig devices;
   AutopilotConfig autopilot;
   StackConfig stack;
+  MissionSemanticsConfig semantics;
   ScoringConfig scoring;
 
   void fields(auto& f) {
@@ -79,6 +95,7 @@ struct ScenarioConfig {
     f("devices", devices, "which run, and how long they take");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
+    f("semantics", semantics, "what the mapped cloud shows");
     f("scoring", scoring, "what the truth is compared with");
     f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
             "devices.lidar true, or odometry.source mocap");

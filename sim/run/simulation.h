@@ -14,6 +14,7 @@
 #include "run/stage_timer.h"
 #include "run/trajectory_hash.h"
 #include "scoring/map_error.h"
+#include "scoring/semantic_score.h"
 #include "sensors/scene.h"
 #include "stack/job_queue.h"
 
@@ -61,6 +62,7 @@ struct FlightResult {
   FlightScore flight;
   std::optional<MapScore> map;             ///< nothing without a map
   std::optional<CoverageResult> coverage;  ///< of explorations
+  std::optional<SemanticScore> semantic;   ///< of explorations that make a semantic map
   ExplorationLog exploration;
   int plans = 0;
   int plan_failures = 0;
@@ -115,11 +117,13 @@ class Simulation {
   void write_cloud();
   void note_cloud_growth();
   void score_coverage();
+  [[nodiscard]] SemanticScore map_semantics(const std::vector<Vec3f>& cloud_O,
+                                            const std::vector<PosePair>& poses) const;
 
   struct LidarFrame;
   struct Timers {
     StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
-        recording{"recording"};
+        recording{"recording"}, semantics{"semantics"};
   };
 
   ScenarioConfig config_;

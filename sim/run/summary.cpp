@@ -104,6 +104,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   figures.set("odometry.source", enum_names(source)[static_cast<std::size_t>(source)]);
   if (result.map) add_figures(*result.map, figures);
   if (result.coverage) add_figures(*result.coverage, figures);
+  if (result.semantic) add_figures(*result.semantic, figures);
   result.exploration.add_figures(figures);
   return figures.json();
 }

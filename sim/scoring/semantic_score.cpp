@@ -265,6 +265,28 @@ std::vector<TrueObject> true_trunks(const World& world, const Nearness& near) {
   return trunks;
 }
 
+/// The upper face of a slab: what has nothing of it above.
+class UpperFace {
+ public:
+  explicit UpperFace(const Group& group) {
+    for (const Triangle& t : group.triangles) {
+      sample(t, kSampleSide, [&](const Vec3& p, const Vec3&) {
+        const auto [at, fresh] = top_.try_emplace(key(p), p.z());
+        if (!fresh) at->second = std::max(at->second, p.z());
+      });
+    }
+  }
+  [[nodiscard]] bool has(const Vec3& p) const { return p.z() > top_.at(key(p)) - kWithin; }
+
+ private:
+  static constexpr double kSquare = 0.2, kWithin = 0.2;  // m: less than a slab, more than its slope
+  static std::int64_t key(const Vec3& p) {
+    return (static_cast<std::int64_t>(std::floor(p.x() / kSquare)) << 32) ^
+           (static_cast<std::int64_t>(std::floor(p.y() / kSquare)) & 0xffffffff);
+  }
+  std::unordered_map<std::int64_t, double> top_;
+};
+
 std::vector<TrueObject> true_parts(const World& world, SemanticClass kind, const Nearness& near) {
   constexpr double kFeet = 0.3;  // m, hidden by kerbs and wheels
   std::vector<TrueObject> parts;
@@ -277,8 +299,10 @@ std::vector<TrueObject> true_parts(const World& world, SemanticClass kind, const
     part.size = footprint.length;
     const double low = group.box.min().z();
     const bool ramp = kind == SemanticClass::kRamp;
+    const std::optional<UpperFace> upper =
+        ramp ? std::optional<UpperFace>(std::in_place, group) : std::nullopt;
     part.mapped_fraction = mapped_share(group, near, [&](const Vec3& p, const Vec3& normal) {
-      if (ramp) return std::abs(normal.z()) > 0.5;
+      if (ramp) return upper->has(p);
       const bool level = std::abs(normal.z()) > 0.9;
       return (kind == SemanticClass::kCar || !level) && p.z() > low + kFeet;
     });

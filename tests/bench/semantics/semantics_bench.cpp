@@ -1,9 +1,11 @@
 // Scores of the semantic map on the clouds that missions would leave, and its time:
 //
 //     semantics_bench forest|garage FIRST_SEED LAST_SEED [key=value]... [--keep FOLDER] [--list]
+//         [--run FOLDER]
 //
 // Keys are those of `world` and `semantics`, as in a scenario. --keep stores the clouds in a folder
-// and takes them from there the next time; --list names what was missed or invented.
+// and takes them from there the next time; --list names what was missed or invented; --run takes
+// the cloud and the path of a run of that seed instead of making one.
 
 #include <chrono>
 #include <cstdio>
@@ -15,6 +17,7 @@
 
 #include "config/config.h"
 #include "scoring/semantic_score.h"
+#include "semantics/cloud_file.h"
 #include "semantics/semantic_map.h"
 #include "semantics/semantic_picture.h"
 #include "support/mapped_cloud.h"
@@ -70,6 +73,21 @@ support::MappedCloud cloud_of(const worlds::World& world,
   return cloud;
 }
 
+/// What a run has left; O where it should begin.
+support::MappedCloud cloud_of_run(const worlds::World& world, const fs::path& run) {
+  constexpr double kStanding = 0.14, kStep = 0.25;  // m
+  support::MappedCloud cloud;
+  cloud.points_O = read_cloud_file(run / "cloud.pcd").points;
+  cloud.X_WO = {world.X_WS.R, world.X_WS.p + Vec3(0, 0, kStanding)};
+  std::ifstream poses(run / "estimate.tum");
+  for (std::string line; std::getline(poses, line);) {
+    Vec3 p;
+    if (std::sscanf(line.c_str(), "%*f %lf %lf %lf", &p.x(), &p.y(), &p.z()) != 3) continue;
+    if (cloud.path_O.empty() || (p - cloud.path_O.back()).norm() > kStep) cloud.path_O.push_back(p);
+  }
+  return cloud;
+}
+
 void print_misses(const SemanticMap& map, const sim::SemanticScore& score, const Pose& X_WO) {
   for (const auto& truth : score.truth) {
     double nearest = 1e9;
@@ -112,6 +130,7 @@ void print_misses(const SemanticMap& map, const sim::SemanticScore& score, const
 int main_of(const std::vector<std::string>& words) {
   Trial trial;
   fs::path keep;
+  fs::path run;
   bool list = false;
   ConfigNode root;
   root.kind = ConfigNode::Kind::kMap;
@@ -130,6 +149,8 @@ int main_of(const std::vector<std::string>& words) {
   for (std::size_t i = 3; i < words.size(); ++i) {
     if (words[i] == "--keep") {
       keep = words.at(++i);
+    } else if (words[i] == "--run") {
+      run = words.at(++i);
     } else if (words[i] == "--list") {
       list = true;
     } else {
@@ -140,9 +161,10 @@ int main_of(const std::vector<std::string>& words) {
   if (!keep.empty()) fs::create_directories(keep);
   for (std::uint64_t seed = std::stoull(words.at(1)); seed <= std::stoull(words.at(2)); ++seed) {
     const worlds::World world = worlds::build_world(trial.world, seed, 0.305);
+    const fs::path kept =
+        keep.empty() ? fs::path() : keep / (words[0] + std::to_string(seed) + ".cloud");
     const auto cloud =
-        cloud_of(world, options, seed,
-                 keep.empty() ? fs::path() : keep / (words[0] + std::to_string(seed) + ".cloud"));
+        run.empty() ? cloud_of(world, options, seed, kept) : cloud_of_run(world, run);
     std::vector<Vec3f> path;
     for (const Vec3& p : cloud.path_O) path.push_back(p.cast<float>());
     const std::clock_t begin = std::clock();

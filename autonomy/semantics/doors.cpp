@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kBin = 0.1;                            // m along the wall
 constexpr double kLow = 0.4, kHead = 1.75;              // m above the floor, within every door
+constexpr double kLintelLow = 2.3, kLintelHigh = 2.75;  // m above the floor
 constexpr double kLayer = 0.15;                         // m
 constexpr double kLeastOff = 0.025, kMostOff = 0.18;    // m, of a leaf from the wall's face
 constexpr double kLeastWidth = 0.75, kMostWidth = 3.0;  // m
@@ -20,6 +21,7 @@ struct Slice {
   double offset_sum = 0;  ///< of the points near the face
   int near = 0;
   std::uint32_t layers = 0;    ///< with points near the face
+  int lintel = 0;              ///< points on the face above the doors' heads
   int behind = 0, before = 0;  ///< points beyond, on either side
   [[nodiscard]] double offset() const { return near > 0 ? offset_sum / near : 0; }
 };
@@ -51,6 +53,10 @@ std::vector<Slice> slices_of(const WallFace& wall, const WorkingCloud& cloud,
           if (t < k * kBin || t >= (k + 1) * kBin) return;
           const auto z = static_cast<double>(cloud.points[i].z());
           const double h = z - wall.base_z;
+          if (h > kLintelLow && h < kLintelHigh) {
+            slices[static_cast<std::size_t>(k)].lintel +=
+                std::abs(d.dot(n)) < kLeastOff + 0.02 ? 1 : 0;
+          }
           if (h < kLow || h > kHead) return;
           if (std::abs(z - static_cast<double>(clearances.above_floor[i]) - wall.base_z) > 0.5)
             return;
@@ -85,6 +91,10 @@ std::vector<Door> find_doors(const WorkingCloud& cloud, const Clearances& cleara
       if (look == Look::kWall || look == Look::kUnknown) continue;
       const double width = static_cast<double>(last - first) * kBin;
       if (width < kLeastWidth || width > kMostWidth) continue;
+      // Below a lintel; what sticks out all the way up is a pillar.
+      std::size_t below = 0;
+      for (std::size_t i = first; i < last; ++i) below += slices[i].lintel >= 2 ? 1 : 0;
+      if (2 * below < last - first) continue;
       // Wall on at least one side, so that it is a door in it; on both if it is open.
       const bool before = first > 0 && looks[first - 1] != Look::kUnknown;
       const bool after = last < looks.size() && looks[last] != Look::kUnknown;

@@ -40,10 +40,11 @@ class RampFinder {
  public:
   RampFinder(const std::vector<LevelSurface>& surfaces, const GarageConfig& config) {
     const double least = config.ramp_slope_deg * std::numbers::pi / 180;
+    const double most = config.max_slope_deg * std::numbers::pi / 180;
     for (const LevelSurface& surface : surfaces) {
       masks_.emplace_back();
       if (surface.kind != LevelSurface::Kind::kFloor) continue;
-      masks_.back() = find(surface, least);
+      masks_.back() = find(surface, least, most);
       frame_ = surface.height;
     }
   }
@@ -54,7 +55,7 @@ class RampFinder {
   }
   /// Whether a place lies on a ramp or just beside it.
   [[nodiscard]] bool at(const Vec2& p, double z) const {
-    constexpr double kBeside = 0.6, kSlack = 0.3;  // m
+    constexpr double kBeside = 0.6, kSlack = 0.1;  // m
     return std::any_of(ramps_.begin(), ramps_.end(), [&](const SemanticObject& ramp) {
       const Rectangle box{ramp.position.head<2>(), ramp.size.x(), ramp.size.y(), ramp.yaw_rad};
       return box.distance(p) < kBeside && z > ramp.base_z + kSlack &&
@@ -64,14 +65,15 @@ class RampFinder {
   [[nodiscard]] const std::vector<SemanticObject>& ramps() const { return ramps_; }
 
  private:
-  std::vector<std::uint8_t> find(const LevelSurface& surface, double least) {
+  std::vector<std::uint8_t> find(const LevelSurface& surface, double least, double most) {
     const Raster slopes = slopes_of(surface);
     constexpr double kLeastArea = 8.0, kLeastSide = 1.8;  // m^2, m
     constexpr std::array<std::pair<int, int>, 4> kSides{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
     std::vector<std::uint8_t> mask(slopes.values.size(), 0);
     std::vector<std::uint8_t> open(slopes.values.size(), 0);
     for (std::size_t i = 0; i < open.size(); ++i) {
-      open[i] = surface.seen[i] != 0 && static_cast<double>(slopes.values[i]) >= least;
+      const auto slope = static_cast<double>(slopes.values[i]);
+      open[i] = slope >= least && slope <= most;
     }
     for (std::size_t i = 0; i < open.size(); ++i) {
       if (open[i] == 0) continue;
@@ -211,10 +213,11 @@ SceneReading read_garage(const WorkingCloud& cloud, std::span<const Vec3f> path,
   const RampFinder ramps(surfaces, config.garage);
   UprightStructure structure = find_upright_structure(cloud, clearances, config.garage);
   std::vector<ParkedCar> cars = find_cars(cloud, clearances, structure, path, config.garage);
-  const std::vector<Door> doors = find_doors(cloud, clearances, structure);
-  // Ramps bear neither; what seems to stand there belongs to their walls.
+  std::vector<Door> doors = find_doors(cloud, clearances, structure);
+  // Ramps bear none of them; what seems to stand there belongs to their walls.
   std::erase_if(structure.pillars,
                 [&](const Pillar& pillar) { return ramps.at(pillar.box.centre, pillar.base_z); });
+  std::erase_if(doors, [&](const Door& door) { return ramps.at(door.centre, door.base_z); });
   std::erase_if(cars, [&](const ParkedCar& car) { return ramps.at(car.box.centre, car.base_z); });
   reading.ground = ground_of(cloud, surfaces);
   reading.heights = clearances.above_floor;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kCell = 0.25;   // m
 constexpr float kGap = 0.15F;    // m, between groups of a column
+constexpr float kFree = 0.45F;   // m, above a floor or below a ceiling: no sparse wall is level
 constexpr float kThin = 0.3F;    // m, of a group that may be level: a slope of 45 degrees
 constexpr float kNoise = 0.06F;  // m, between neighbours
 constexpr int kWiden = 2;        // cells
@@ -56,8 +57,10 @@ class Pieces {
         if (last > first && z - points[column[last - 1]].z() > kGap) break;
         sum += z;
       }
-      const float thickness = points[column[last - 1]].z() - points[column[first]].z();
-      if (last - first >= 2 && thickness < kThin) {
+      const float low = points[column[first]].z(), high = points[column[last - 1]].z();
+      const bool free_below = first == 0 || low - points[column[first - 1]].z() > kFree;
+      const bool free_above = last == column.size() || points[column[last]].z() - high > kFree;
+      if (last - first >= 2 && high - low < kThin && (free_below || free_above)) {
         pieces_.push_back({sum / static_cast<float>(last - first), false});
       }
     }

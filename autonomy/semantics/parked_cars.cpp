@@ -36,7 +36,7 @@ using Group = std::vector<std::uint32_t>;
 
 struct Cut {
   Group first, second;
-  double thickness = 0;  ///< points where it was cut, over the mean
+  double untidiness = 0;  ///< of both parts
 };
 
 /// Cuts a group across an axis where it is thinnest, if that leaves two sensible parts.
@@ -56,13 +56,20 @@ std::optional<Cut> cut(const std::vector<Vec3f>& points, const Group& group, con
     if (bins[i] < bins[thinnest]) thinnest = i;
   }
   Cut parts;
-  parts.thickness =
-      bins[thinnest] * static_cast<double>(bins.size()) / static_cast<double>(group.size());
   const double where = from + (static_cast<double>(thinnest) + 0.5) * kBin;
   for (std::size_t k = 0; k < group.size(); ++k) {
     (at[k] < where ? parts.first : parts.second).push_back(group[k]);
   }
   return parts;
+}
+
+/// Sum of the distances of a group's points from its best rectangle's sides.
+double untidiness(const std::vector<Vec3f>& points, const Group& group) {
+  constexpr double kFar = 0.4, kTail = 0.01;  // m, share
+  std::vector<Vec2> plan;
+  for (const std::uint32_t i : group) plan.push_back(flat(points[i]));
+  return outline_distance(plan, fit_rectangle(plan, kTail), kFar) *
+         static_cast<double>(plan.size());
 }
 
 /// Groups that are no larger than a car.
@@ -76,12 +83,15 @@ void split(const std::vector<Vec3f>& points, Group group, const GarageConfig& co
     out.push_back(std::move(group));
     return;
   }
+  // Of the two ways, the one that leaves parts with cleaner outlines.
   std::optional<Cut> best;
   for (const Vec2& axis : {box.along(), box.across()}) {
     auto parts = cut(points, group, axis, kLeastPart);
-    if (parts && (!best || parts->thickness < best->thickness)) best = std::move(parts);
+    if (!parts || parts->first.empty() || parts->second.empty()) continue;
+    parts->untidiness = untidiness(points, parts->first) + untidiness(points, parts->second);
+    if (!best || parts->untidiness < best->untidiness) best = std::move(parts);
   }
-  if (!best || best->first.empty() || best->second.empty()) return;
+  if (!best) return;
   split(points, best->first, config, out);
   split(points, best->second, config, out);
 }
@@ -151,7 +161,10 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
       if (car.height < kLeastHeight) continue;
       const bool length_seen = car.box.length >= config.car_min_length_m;
       const bool width_seen = car.box.width >= 1.2;
-      if (!length_seen && car.box.length < 1.3) continue;
+      // Of an end, the whole width and a part of the sides or the bonnet.
+      const bool is_end =
+          car.box.length > 1.5 && car.box.length < config.car_max_width_m && car.box.width > 0.3;
+      if (!length_seen && !is_end) continue;
       const Vec2 away = car.box.centre - viewer_of(car.box.centre, car.base_z, path);
       if (!length_seen) {
         // The longer seen side is the car's end: it goes on behind it.

@@ -44,6 +44,18 @@ Rectangle rectangle_around(std::span<const Vec2> points, double yaw_rad, double 
   return out;
 }
 
+double outline_distance(std::span<const Vec2> points, const Rectangle& box, double far) {
+  const Vec2 u = box.along(), v = box.across();
+  double sum = 0;
+  for (const Vec2& p : points) {
+    const Vec2 d = p - box.centre;
+    const double side = std::min(std::abs(std::abs(d.dot(u)) - box.length / 2),
+                                 std::abs(std::abs(d.dot(v)) - box.width / 2));
+    sum += std::min(side, far);
+  }
+  return points.empty() ? 0 : sum / static_cast<double>(points.size());
+}
+
 Rectangle fit_rectangle(std::span<const Vec2> points, double tail) {
   constexpr int kAngles = 90;
   constexpr double kFar = 0.1;               // m
@@ -55,14 +67,7 @@ Rectangle fit_rectangle(std::span<const Vec2> points, double tail) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kAngles; ++i) {
     const Rectangle box = rectangle_around(some, i * std::numbers::pi / 2 / kAngles, tail);
-    double cost = 0;
-    const Vec2 u = box.along(), v = box.across();
-    for (const Vec2& p : some) {
-      const Vec2 d = p - box.centre;
-      const double side = std::min(std::abs(std::abs(d.dot(u)) - box.length / 2),
-                                   std::abs(std::abs(d.dot(v)) - box.width / 2));
-      cost += std::min(side, kFar);
-    }
+    const double cost = outline_distance(some, box, kFar);
     if (cost < least - 1e-12) {
       least = cost;
       best = box;

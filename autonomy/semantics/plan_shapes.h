@@ -34,4 +34,8 @@ Rectangle rectangle_around(std::span<const Vec2> points, double yaw_rad, double 
 /// detection using laser scanners, IV 2017 (closeness criterion).
 Rectangle fit_rectangle(std::span<const Vec2> points, double tail);
 
+/// Mean distance of points from the nearest side of a rectangle, those further than `far` counted
+/// as that far.
+double outline_distance(std::span<const Vec2> points, const Rectangle& box, double far);
+
 }  // namespace arex

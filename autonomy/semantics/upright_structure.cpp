@@ -71,6 +71,26 @@ Line line_through(const std::vector<Vec2>& points) {
   return line;
 }
 
+/// The line through a place that most points around it lie on, refined on those. A thin wall's
+/// other face is near, too: the points as a whole would not do.
+std::optional<Line> local_line(const std::vector<Vec2>& near, const Vec2& place) {
+  constexpr std::size_t kFewest = 6;
+  constexpr double kLeastArm = 0.15;  // m
+  std::vector<Vec2> best;
+  for (const Vec2& q : near) {
+    const Vec2 arm = q - place;
+    if (arm.norm() < kLeastArm) continue;
+    const Line line{place, arm.normalized(), 0};
+    std::vector<Vec2> on;
+    for (const Vec2& p : near) {
+      if (line.distance(p) < 0.5 * kOnFace) on.push_back(p);
+    }
+    if (on.size() > best.size()) best = std::move(on);
+  }
+  if (best.size() < kFewest) return std::nullopt;
+  return line_through(best);
+}
+
 /// Grows wall faces in one storey's band.
 class WallGrower {
  public:
@@ -116,8 +136,9 @@ class WallGrower {
       }
     });
     if (near.size() < kFewest) return std::nullopt;
-    Line line = line_through(near);
-    if (line.across > 0.05 || line.distance(flat(s)) > kOnFace) return std::nullopt;
+    const auto start = local_line(near, flat(s));
+    if (!start) return std::nullopt;
+    Line line = *start;
     WallFace wall;
     for (int round = 0; round < 12; ++round) {
       const double before = round == 0 ? 0 : wall.length();

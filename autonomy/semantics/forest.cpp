@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 
@@ -156,12 +157,11 @@ void label_stem(const std::vector<Ring>& rings, const ColumnIndex& index,
 
 /// What a stem's neighbourhood says of its tree.
 struct Crown {
-  std::vector<float> highest;  ///< the kTop highest heights, falling
+  std::vector<float> highest;  ///< z of the kTop highest points, falling
   std::vector<std::uint64_t> cells;
-  void add(float height, std::uint64_t cell, bool canopy) {
-    if (highest.size() < kTop || height > highest.back()) {
-      highest.insert(std::upper_bound(highest.begin(), highest.end(), height, std::greater<>()),
-                     height);
+  void add(float z, std::uint64_t cell, bool canopy) {
+    if (highest.size() < kTop || z > highest.back()) {
+      highest.insert(std::upper_bound(highest.begin(), highest.end(), z, std::greater<>()), z);
       if (highest.size() > kTop) highest.pop_back();
     }
     if (canopy && (cells.empty() || cells.back() != cell)) cells.push_back(cell);
@@ -210,7 +210,7 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
                                               : SemanticClass::kCanopy;
     }
     if (h > kGroundThickness) {
-      crowns[tree].add(heights[i], canopy.cell_of(p.x(), p.y()), h > kCrownBase);
+      crowns[tree].add(cloud.points[i].z(), canopy.cell_of(p.x(), p.y()), h > kCrownBase);
     }
   }
   for (std::size_t i = 0; i < stems.size(); ++i) {
@@ -220,7 +220,7 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
     object.kind = SemanticClass::kTrunk;
     object.position = {e.stem.centre.x(), e.stem.centre.y(), ground + kBreastHeight};
     const double height =
-        crowns[i].highest.empty() ? 0 : static_cast<double>(crowns[i].highest.back());
+        crowns[i].highest.empty() ? 0 : static_cast<double>(crowns[i].highest.back()) - ground;
     object.size = {2 * e.stem.radius, 2 * e.stem.radius, height};
     object.base_z = ground;
     object.canopy_diameter = crowns[i].diameter();

@@ -47,6 +47,7 @@ class RampFinder {
       masks_.back() = find(surface, least, most);
       frame_ = surface.height;
     }
+    merge();
   }
   [[nodiscard]] bool steep(int surface, const Vec2& p) const {
     if (surface < 0) return false;
@@ -65,6 +66,44 @@ class RampFinder {
   [[nodiscard]] const std::vector<SemanticObject>& ramps() const { return ramps_; }
 
  private:
+  /// Joins pieces of one ramp, whose floors met on it.
+  void merge() {
+    constexpr double kApart = 1.0, kAskew = 0.2;  // m, rad
+    for (std::size_t i = 0; i < ramps_.size(); ++i) {
+      for (std::size_t j = i + 1; j < ramps_.size();) {
+        SemanticObject &a = ramps_[i], &b = ramps_[j];
+        const bool along = std::abs(std::sin(a.yaw_rad - b.yaw_rad)) < kAskew;
+        const bool level =
+            a.base_z < b.base_z + b.size.z() + kApart && b.base_z < a.base_z + a.size.z() + kApart;
+        std::vector<Vec2> corners = corners_of(a);
+        const Rectangle box{b.position.head<2>(), b.size.x(), b.size.y(), b.yaw_rad};
+        const bool beside = std::any_of(corners.begin(), corners.end(), [&](const Vec2& corner) {
+          return box.distance(corner) < kApart;
+        });
+        if (!along || !level || !beside) {
+          ++j;
+          continue;
+        }
+        for (const Vec2& corner : corners_of(b)) corners.push_back(corner);
+        const Rectangle both = rectangle_around(corners, a.yaw_rad, 0);
+        const double low = std::min(a.base_z, b.base_z);
+        const double high = std::max(a.base_z + a.size.z(), b.base_z + b.size.z());
+        a.position = {both.centre.x(), both.centre.y(), 0.5 * (low + high)};
+        a.size = {both.length, both.width, high - low};
+        a.yaw_rad = both.yaw_rad;
+        a.base_z = low;
+        a.confidence = std::min(a.confidence, b.confidence);
+        ramps_.erase(ramps_.begin() + static_cast<std::ptrdiff_t>(j));
+      }
+    }
+  }
+  static std::vector<Vec2> corners_of(const SemanticObject& ramp) {
+    const Vec2 u(std::cos(ramp.yaw_rad), std::sin(ramp.yaw_rad)), v(-u.y(), u.x());
+    const Vec2 centre = ramp.position.head<2>();
+    const Vec2 a = 0.5 * ramp.size.x() * u, b = 0.5 * ramp.size.y() * v;
+    return {centre + a + b, centre + a - b, centre - a + b, centre - a - b};
+  }
+
   std::vector<std::uint8_t> find(const LevelSurface& surface, double least, double most) {
     const Raster slopes = slopes_of(surface);
     constexpr double kLeastArea = 8.0, kLeastSide = 1.8;  // m^2, m

@@ -63,13 +63,17 @@ std::optional<Cut> cut(const std::vector<Vec3f>& points, const Group& group, con
   return parts;
 }
 
-/// Sum of the distances of a group's points from its best rectangle's sides.
-double untidiness(const std::vector<Vec3f>& points, const Group& group) {
-  constexpr double kFar = 0.4, kTail = 0.01;  // m, share
+/// How little a group looks like one car: the sum of the distances of its points from its best
+/// rectangle's sides, and three times that if the rectangle has no car's size.
+double untidiness(const std::vector<Vec3f>& points, const Group& group,
+                  const GarageConfig& config) {
+  constexpr double kFar = 0.4, kTail = 0.01, kShort = 2.5, kNarrow = 1.2;  // m, share, m, m
   std::vector<Vec2> plan;
   for (const std::uint32_t i : group) plan.push_back(flat(points[i]));
-  return outline_distance(plan, fit_rectangle(plan, kTail), kFar) *
-         static_cast<double>(plan.size());
+  const Rectangle box = fit_rectangle(plan, kTail);
+  const bool one_car = box.length > kShort && box.length < config.car_max_length_m &&
+                       box.width > kNarrow && box.width < config.car_max_width_m;
+  return outline_distance(plan, box, kFar) * static_cast<double>(plan.size()) * (one_car ? 1 : 3);
 }
 
 /// Groups that are no larger than a car.
@@ -88,7 +92,8 @@ void split(const std::vector<Vec3f>& points, Group group, const GarageConfig& co
   for (const Vec2& axis : {box.along(), box.across()}) {
     auto parts = cut(points, group, axis, kLeastPart);
     if (!parts || parts->first.empty() || parts->second.empty()) continue;
-    parts->untidiness = untidiness(points, parts->first) + untidiness(points, parts->second);
+    parts->untidiness =
+        untidiness(points, parts->first, config) + untidiness(points, parts->second, config);
     if (!best || parts->untidiness < best->untidiness) best = std::move(parts);
   }
   if (!best) return;

@@ -31,7 +31,7 @@ const Quiet kQuiet;
 std::optional<Vec3> ransac_circle(const std::vector<Vec2>& points, double tolerance,
                                   const Vec2& radii) {
   constexpr std::size_t kFewest = 6;
-  constexpr int kRounds = 200;
+  constexpr int kRounds = 60;
   if (points.size() < kFewest) return std::nullopt;
   // About their middle: PCL's circles are in single precision.
   Vec2 middle = Vec2::Zero();

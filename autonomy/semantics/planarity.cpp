@@ -11,7 +11,7 @@ double planar_fraction(const WorkingCloud& cloud) {
   constexpr std::size_t kFewest = 8;      // points
   constexpr double kThin = 0.025;         // m, deviation across a plane
   constexpr double kWide = 0.06;          // m, deviation along it
-  constexpr double kLevel = 0.85;         // |n_z| of what may be ground
+  constexpr double kLevel = 0.64;         // |n_z| of what may be ground, up to 50 degrees
   constexpr std::size_t kMost = 400'000;  // points that are looked at, in whole cubes
   struct Keyed {
     std::uint64_t key;

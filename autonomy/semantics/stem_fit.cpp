@@ -62,6 +62,11 @@ std::vector<Stem> starts(std::span<const Vec3> points, const Vec2& about,
   if (middle.size() < kFewest) {
     for (const Vec3& p : points) middle.emplace_back(p.head<2>());
   }
+  constexpr std::size_t kEnough = 150;  // more say the same, and take their time
+  if (const std::size_t stride = 1 + middle.size() / kEnough; stride > 1) {
+    for (std::size_t i = 0; i * stride < middle.size(); ++i) middle[i] = middle[i * stride];
+    middle.resize((middle.size() + stride - 1) / stride);
+  }
   if (const auto circle = ransac_circle(
           middle, 0.025, {0.5 * config.min_diameter_m, 0.5 * config.max_diameter_m})) {
     add(Stem{circle->head<2>(), Vec2::Zero(), circle->z(), 0});
@@ -131,14 +136,20 @@ double StemEvidence::confidence() const {
   return height * girth * purity * sharpness;
 }
 
-Stem refine_stem(std::span<const Vec3> points, Stem stem, const StemConfig& config) {
+namespace {
+
+// Scales of the weights, m: from where a start may be off to the noise of bark.
+constexpr std::array kCoarse{0.10, 0.08, 0.07, 0.06, 0.05};
+constexpr std::array kFine{0.045, 0.04, 0.04, 0.035, 0.035, 0.03, 0.03};
+
+/// A step of reweighted least squares for each scale.
+Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
+             std::span<const double> scales) {
   constexpr double kSigma = 0.02;                // m, of a point
   constexpr double kLean = 0.15, kTaper = 0.01;  // deviations of the priors, per metre
   constexpr double kUsualTaper = 0.01;           // per metre
-  constexpr std::array<double, 12> kScales{0.10, 0.08, 0.07,  0.06,  0.05, 0.045,
-                                           0.04, 0.04, 0.035, 0.035, 0.03, 0.03};
   const double most = config.max_diameter_m / 2;
-  for (const double scale : kScales) {
+  for (const double scale : scales) {
     Mat6 A = Mat6::Zero();
     Vec6 b = Vec6::Zero();
     for (const Vec3& p : points) {
@@ -172,12 +183,22 @@ Stem refine_stem(std::span<const Vec3> points, Stem stem, const StemConfig& conf
   return stem;
 }
 
+}  // namespace
+
 std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& about,
                                      const StemConfig& config) {
+  constexpr std::size_t kFollowed = 2;  // of the starts, after the coarse steps
   if (points.size() < kFewest) return std::nullopt;
-  std::optional<StemEvidence> best;
+  std::vector<StemEvidence> begun;
   for (const Stem& start : starts(points, about, config)) {
-    const StemEvidence evidence = weigh(points, refine_stem(points, start, config));
+    begun.push_back(weigh(points, improve(points, start, config, kCoarse)));
+  }
+  std::stable_sort(begun.begin(), begun.end(),
+                   [](const StemEvidence& a, const StemEvidence& b) { return a.score > b.score; });
+  if (begun.size() > kFollowed) begun.resize(kFollowed);
+  std::optional<StemEvidence> best;
+  for (const StemEvidence& each : begun) {
+    const StemEvidence evidence = weigh(points, improve(points, each.stem, config, kFine));
     if (evidence.inliers < static_cast<int>(kFewest)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }

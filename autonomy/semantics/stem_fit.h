@@ -55,7 +55,4 @@ struct StemEvidence {
 std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& about,
                                      const StemConfig& config);
 
-/// Improves a stem from where it is.
-Stem refine_stem(std::span<const Vec3> points, Stem stem, const StemConfig& config);
-
 }  // namespace arex

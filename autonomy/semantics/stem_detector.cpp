@@ -138,8 +138,8 @@ bool is_stem(const StemEvidence& e, const StemConfig& config) {
 
 std::vector<StemEvidence> find_stems(const WorkingCloud& cloud, const ColumnIndex& index,
                                      const std::vector<float>& heights, const StemConfig& config) {
-  constexpr double kOff = 0.1;    // m, from a stem to where the next candidate may be
-  constexpr double kTried = 0.2;  // m, around a candidate that is none
+  constexpr double kOff = 0.1;     // m, from a stem to where the next candidate may be
+  constexpr double kTried = 0.12;  // m, around a candidate that is none
   const LayerRaster raster(cloud, heights);
   std::vector<StemEvidence> stems;
   std::vector<std::uint8_t> closed(raster.cells(), 0);  // to further candidates

@@ -45,34 +45,42 @@ std::optional<Stem> circle_by_moments(std::span<const Vec3> points, const Vec2& 
   return Stem{about + c, Vec2::Zero(), std::sqrt(r2), 0};
 }
 
-std::vector<Stem> starts(std::span<const Vec3> points, const Vec2& about,
-                         const StemConfig& config) {
+bool possible(const Stem& stem, const StemConfig& config) {
+  return stem.radius > 0.01 && stem.radius <= config.max_diameter_m / 2;
+}
+
+/// Circles by moments around the place, and two guesses.
+std::vector<Stem> simple_starts(std::span<const Vec3> points, const Vec2& about,
+                                const StemConfig& config) {
   std::vector<Stem> stems;
-  const auto add = [&](const std::optional<Stem>& stem) {
-    if (stem && stem->radius <= config.max_diameter_m / 2 && stem->radius > 0.01) {
-      stems.push_back(*stem);
-    }
-  };
-  for (const double within : {0.15, 0.3, 0.5}) add(circle_by_moments(points, about, within));
-  // Of a metre around breast height, where a lean moves the circle least.
+  for (const double within : {0.15, 0.3, 0.5}) {
+    const auto stem = circle_by_moments(points, about, within);
+    if (stem && possible(*stem, config)) stems.push_back(*stem);
+  }
+  for (const double radius : {0.05, 0.12}) stems.push_back({about, Vec2::Zero(), radius, 0});
+  return stems;
+}
+
+/// A circle by RANSAC through points within 0.6 m of breast height, where a lean moves it least.
+std::optional<Stem> ransac_start(std::span<const Vec3> points, const StemConfig& config) {
+  constexpr double kReach = 0.6;        // m
+  constexpr std::size_t kEnough = 150;  // more points say the same, and take their time
+  constexpr double kTolerance = 0.025;  // m
   std::vector<Vec2> middle;
   for (const Vec3& p : points) {
-    if (std::abs(p.z() - kBreastHeight) < 0.6) middle.emplace_back(p.head<2>());
+    if (std::abs(p.z() - kBreastHeight) < kReach) middle.emplace_back(p.head<2>());
   }
   if (middle.size() < kFewest) {
     for (const Vec3& p : points) middle.emplace_back(p.head<2>());
   }
-  constexpr std::size_t kEnough = 150;  // more say the same, and take their time
   if (const std::size_t stride = 1 + middle.size() / kEnough; stride > 1) {
     for (std::size_t i = 0; i * stride < middle.size(); ++i) middle[i] = middle[i * stride];
     middle.resize((middle.size() + stride - 1) / stride);
   }
-  if (const auto circle = ransac_circle(
-          middle, 0.025, {0.5 * config.min_diameter_m, 0.5 * config.max_diameter_m})) {
-    add(Stem{circle->head<2>(), Vec2::Zero(), circle->z(), 0});
-  }
-  for (const double radius : {0.05, 0.12}) add(Stem{about, Vec2::Zero(), radius, 0});
-  return stems;
+  const auto circle =
+      ransac_circle(middle, kTolerance, {0.5 * config.min_diameter_m, 0.5 * config.max_diameter_m});
+  if (!circle) return std::nullopt;
+  return Stem{circle->head<2>(), Vec2::Zero(), circle->z(), 0};
 }
 
 /// Sectors of the girth, each about as wide as a map's voxel.
@@ -188,13 +196,23 @@ Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
 std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& about,
                                      const StemConfig& config) {
   constexpr std::size_t kFollowed = 2;  // of the starts, after the coarse steps
+  constexpr double kHopeless = 0.1;     // confidence; bushes have less
   if (points.size() < kFewest) return std::nullopt;
   std::vector<StemEvidence> begun;
-  for (const Stem& start : starts(points, about, config)) {
+  const auto begin = [&](const Stem& start) {
     begun.push_back(weigh(points, improve(points, start, config, kCoarse)));
+  };
+  const auto by_score = [](const StemEvidence& a, const StemEvidence& b) {
+    return a.score > b.score;
+  };
+  for (const Stem& start : simple_starts(points, about, config)) begin(start);
+  std::stable_sort(begun.begin(), begun.end(), by_score);
+  // RANSAC costs more than all of these: only where they leave a doubt.
+  const double sure = begun.front().confidence();
+  if (sure > kHopeless && sure < config.min_confidence) {
+    if (const auto start = ransac_start(points, config)) begin(*start);
+    std::stable_sort(begun.begin(), begun.end(), by_score);
   }
-  std::stable_sort(begun.begin(), begun.end(),
-                   [](const StemEvidence& a, const StemEvidence& b) { return a.score > b.score; });
   if (begun.size() > kFollowed) begun.resize(kFollowed);
   std::optional<StemEvidence> best;
   for (const StemEvidence& each : begun) {

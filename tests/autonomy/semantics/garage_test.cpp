@@ -99,9 +99,10 @@ std::vector<const SemanticObject*> all(const SemanticMap& map, SemanticClass kin
 /// The object of a kind nearest to a place of the hall.
 const SemanticObject* nearest(const SemanticMap& map, SemanticClass kind, const Vec2& p_W) {
   const auto found = all(map, kind);
-  const auto best = std::min_element(found.begin(), found.end(), [&](const auto* a, const auto* b) {
-    return (a->position.head<2>() - p_W).norm() < (b->position.head<2>() - p_W).norm();
-  });
+  const auto best = std::min_element(
+      found.begin(), found.end(), [&](const SemanticObject* a, const SemanticObject* b) {
+        return (a->position.head<2>() - p_W).norm() < (b->position.head<2>() - p_W).norm();
+      });
   return best == found.end() ? nullptr : *best;
 }
 

@@ -246,7 +246,7 @@ PcdHeader parse_pcd_header(std::string_view head, std::uintmax_t size) {
   const bool ascii = header.data == PcdHeader::Data::kAscii;
   const bool binary = header.data == PcdHeader::Data::kBinary;
   const std::size_t fewest = ascii ? 2 * header.fields.size() - 1 : binary ? header.stride : 0;
-  if (header.points > rest || fewest * header.points > rest ||
+  if (fewest * header.points > rest ||
       (!ascii && !binary && header.points * header.stride > 264 * rest)) {
     refuse("has " + std::to_string(rest) + " bytes of points, expected " +
            std::to_string(header.points) + " points");

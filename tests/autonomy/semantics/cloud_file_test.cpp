@@ -152,7 +152,7 @@ TEST(CloudFile, RefusesWhatIsNoCloudWithOneLine) {
   EXPECT_NE(changed(binary, "POINTS 200", "POINTS 201").find("WIDTH times HEIGHT"),
             std::string::npos);
   EXPECT_NE(changed(binary, "DATA binary", "DATA zipped").find("zipped"), std::string::npos);
-  EXPECT_NE(changed(pcd_ascii(points), "DATA ascii\n", "DATA ascii\n1 two 3 4\n").find("line 11"),
+  EXPECT_NE(changed(pcd_ascii(points), "DATA ascii\n", "DATA ascii\n1 two 3 4\n").find("line 12"),
             std::string::npos);
 }
 
@@ -178,7 +178,7 @@ TEST(CloudFile, BelievesNoHeaderThatPromisesMoreThanTheFile) {
 TEST(CloudFile, AnswersToDamageWithACloudOrOneLine) {
   const std::vector<std::string> sound = all_encodings(some_points(120));
   int read_whole = 0, refused = 0;
-  for (std::uint64_t number = 0; number < 1200; ++number) {
+  for (std::uint64_t number = 0; number < 300; ++number) {
     RandomStream random(number, "damaged cloud");
     const std::string& bytes = sound[number % sound.size()];
     // Most of the damage where it hurts.
@@ -195,8 +195,8 @@ TEST(CloudFile, AnswersToDamageWithACloudOrOneLine) {
       ++refused;
     }
   }
-  EXPECT_GT(read_whole, 50);
-  EXPECT_GT(refused, 50);
+  EXPECT_GT(read_whole, 10);
+  EXPECT_GT(refused, 10);
 }
 
 }  // namespace

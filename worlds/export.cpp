@@ -1,11 +1,13 @@
 #include "worlds/export.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -26,9 +28,7 @@ class OutputFile {
     return *this;
   }
   OutputFile& operator<<(double value) {
-    std::array<char, 32> text;
-    std::snprintf(text.data(), text.size(), "%.9g", value);
-    bytes_ += text.data();
+    fmt::format_to(std::back_inserter(bytes_), "{:.9g}", value);
     return *this;
   }
   OutputFile& operator<<(std::size_t value) {

@@ -171,7 +171,7 @@ double ForestRecipe::expected_triangles() const {
   return per_m2 * size_m.prod();
 }
 
-World build_forest(const ForestRecipe& recipe, std::uint64_t seed) {
+World build(const ForestRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream ground_stream(seed, "worlds/forest/ground");
   const HeightField terrain = make_terrain(recipe, ground_stream.fork(0));

@@ -83,6 +83,8 @@ struct ForestRecipe {
   static constexpr double kMostTriangles = 1e7;  ///< about 2 GB with the tree for the rays
   /// Roughly, and rather too many: nothing is taken off for what is cleared.
   [[nodiscard]] double expected_triangles() const;
+  /// The ground, along x and y from the start, m.
+  [[nodiscard]] Eigen::AlignedBox2d extent() const { return {-0.5 * size_m, 0.5 * size_m}; }
 
   void fields(auto& f) {
     f("size_m", size_m, "extent of the ground along x and y, the start in its middle");
@@ -123,7 +125,7 @@ struct ForestRecipe {
 
 /// W's origin is at the start's x and y. World::bounds spans the ground and reaches the highest
 /// leaf.
-World build_forest(const ForestRecipe& recipe, std::uint64_t seed);
+World build(const ForestRecipe& recipe, std::uint64_t seed);
 
 /// Where a tree stands, x and y; the index names its random stream, so that it grows the same
 /// whichever others are cleared away.

@@ -4,26 +4,13 @@
 #include <numbers>
 #include <vector>
 
+#include "worlds/level_ground.h"
 #include "worlds/mesh_builder.h"
 #include "worlds/poisson_disc.h"
 #include "worlds/reflectivity.h"
 
 namespace arex::worlds {
 namespace {
-
-/// A height field that covers [low, high] at z = 0.
-HeightField level_ground(const Vec2& low, const Vec2& high, double spacing) {
-  HeightField field;
-  field.origin = low;
-  field.spacing_m = spacing;
-  field.columns = static_cast<int>(std::ceil((high.x() - low.x()) / spacing - 1e-9)) + 1;
-  field.rows = static_cast<int>(std::ceil((high.y() - low.y()) / spacing - 1e-9)) + 1;
-  field.height_m.assign(
-      static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows), 0.0F);
-  return field;
-}
-
-constexpr double kGroundSpacing = 1.0;  // m; any would do on level ground
 
 /// A pillar whose drawn surface touches its round solid at y = +-radius exactly, where gaps are
 /// measured, and lies within it elsewhere.
@@ -45,7 +32,7 @@ void add_pillar(MeshBuilder& builder, const Vec2& p, double radius, double heigh
 
 }  // namespace
 
-World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
+World build(const GapsRecipe& recipe, std::uint64_t seed) {
   constexpr double kWallThickness = 0.2;
   MeshBuilder builder;
   RandomStream random(seed, "worlds/gaps");
@@ -53,7 +40,7 @@ World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
   const Vec2 high(recipe.length_m - recipe.start_radius_m, recipe.width_m / 2);
   builder.add_height_field(
       builder.add_object(SurfaceClass::kGround, kConcreteReflectivity.draw(random)),
-      level_ground(low, high, kGroundSpacing));
+      level_ground(low, high));
 
   // The row starts at both lips of the opening and runs outwards to the side walls.
   const double radius = recipe.pillar_radius_m;
@@ -94,12 +81,12 @@ World build_gaps(const GapsRecipe& recipe, std::uint64_t seed) {
   return builder.finish();
 }
 
-World build_empty(const EmptyRecipe& recipe, std::uint64_t seed) {
+World build(const EmptyRecipe& recipe, std::uint64_t seed) {
   MeshBuilder builder;
   RandomStream random(seed, "worlds/empty");
   builder.add_height_field(
       builder.add_object(SurfaceClass::kGround, kForestFloorReflectivity.draw(random)),
-      level_ground(-0.5 * recipe.size_m, 0.5 * recipe.size_m, kGroundSpacing));
+      level_ground(-0.5 * recipe.size_m, 0.5 * recipe.size_m));
   World world = builder.finish();
   world.bounds.high.z() = recipe.height_m;
   return world;

@@ -25,6 +25,13 @@ struct GapsRecipe {
   double field_spacing_m = 1.6;
   double start_radius_m = 2.0;
 
+  /// The ground, along x and y from the start, m.
+  [[nodiscard]] Eigen::AlignedBox2d extent() const {
+    return {Vec2(-start_radius_m, -0.5 * width_m), Vec2(length_m - start_radius_m, 0.5 * width_m)};
+  }
+  /// Whether the gap can be passed is the experiment.
+  void limit_reach(Bounds& region) const { region.high.x() = wall_distance_m; }
+
   void fields(auto& f) {
     f("length_m", length_m, "extent along x: from start_radius_m behind the start");
     f("width_m", width_m, "extent along y, the start in its middle; walled all round");
@@ -61,12 +68,14 @@ struct GapsRecipe {
   }
 };
 
-World build_gaps(const GapsRecipe& recipe, std::uint64_t seed);
+World build(const GapsRecipe& recipe, std::uint64_t seed);
 
 /// Level ground and nothing else, the start in its middle.
 struct EmptyRecipe {
   Vec2 size_m = {60, 50};
   double height_m = 10;
+
+  [[nodiscard]] Eigen::AlignedBox2d extent() const { return {-0.5 * size_m, 0.5 * size_m}; }
 
   void fields(auto& f) {
     f("size_m", size_m, "extent of the ground along x and y");
@@ -76,6 +85,6 @@ struct EmptyRecipe {
   }
 };
 
-World build_empty(const EmptyRecipe& recipe, std::uint64_t seed);
+World build(const EmptyRecipe& recipe, std::uint64_t seed);
 
 }  // namespace arex::worlds

@@ -177,7 +177,7 @@ void add_hall(const Site& site) {
 
 }  // namespace garage
 
-World build_garage(const GarageRecipe& recipe, std::uint64_t seed) {
+World build(const GarageRecipe& recipe, std::uint64_t seed) {
   const GaragePlan plan = plan_garage(recipe, seed);
   MeshBuilder mesh;
   const garage::Site site{recipe, plan, mesh};

@@ -8,7 +8,7 @@
 
 /// An underground parking garage: a walled forecourt with the start pad, a ramp down along +x, and
 /// one storey of pillars, bays with parked cars, rooms, beams and services under the ceiling.
-/// Source of the measures: paper.tex, second scene (30 degree ramp, 100 x 50 m, map from z -5 to
+/// Source of the measures: AREX paper, scene 2 (30 degree ramp, 100 x 50 m, map from z -5 to
 /// -10 m); what the paper leaves open follows common practice for garages and is named so.
 namespace arex::worlds {
 
@@ -81,6 +81,13 @@ struct GarageRecipe {
   int service_runs = 9;
   GarageReflectivity reflectivity;
 
+  /// The hall, along x and y from the start, m.
+  [[nodiscard]] Eigen::AlignedBox2d extent() const {
+    return {Vec2(0, -0.5 * width_m), Vec2(length_m, 0.5 * width_m)};
+  }
+  /// The storey, not the air over its roof.
+  void limit_reach(Bounds& region) const { region.high.z() = ceiling_z_m; }
+
   void fields(auto& f) {
     f("length_m", length_m, "hall along x, from the start (paper, second scene)");
     f("width_m", width_m, "hall along y, centred on the start (paper, second scene)");
@@ -134,6 +141,6 @@ struct GarageRecipe {
 
 /// The world of a recipe. Everything random (rooms, doors, cars, pipe runs) comes from the seed;
 /// World::terrain is empty, the ground is made of shapes. @pre the recipe's checks hold.
-World build_garage(const GarageRecipe& recipe, std::uint64_t seed);
+World build(const GarageRecipe& recipe, std::uint64_t seed);
 
 }  // namespace arex::worlds

@@ -78,9 +78,9 @@ std::vector<std::uint32_t> chunk_order(const World& world, std::vector<std::uint
 
 }  // namespace
 
-std::uint32_t MeshBuilder::add_object(SurfaceClass surface_class, double reflectivity) {
+std::uint32_t MeshBuilder::add_object(SurfaceClass surface_class, double reflectivity, bool felt) {
   require(reflectivity >= 0 && reflectivity <= 1, "a reflectivity lies in [0, 1]");
-  world_.objects.push_back({surface_class, static_cast<float>(reflectivity)});
+  world_.objects.push_back({surface_class, static_cast<float>(reflectivity), felt});
   return static_cast<std::uint32_t>(world_.objects.size() - 1);
 }
 
@@ -224,6 +224,22 @@ void MeshBuilder::add_height_field(std::uint32_t object, HeightField terrain) {
   world_.terrain = std::move(terrain);
 }
 
+void MeshBuilder::add_mesh(std::span<const Vec3> vertices,
+                           std::span<const std::array<std::uint32_t, 3>> triangles,
+                           std::span<const std::uint32_t> object_of_triangle) {
+  require(triangles.size() == object_of_triangle.size(), "each triangle belongs to an object");
+  Mesh& mesh = world_.mesh;
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.reserve(mesh.vertices.size() + vertices.size());
+  mesh.triangles.reserve(mesh.triangles.size() + triangles.size());
+  for (const Vec3& vertex : vertices) add_vertex(vertex);
+  for (const auto& [a, b, c] : triangles) {
+    mesh.triangles.push_back({first + a, first + b, first + c});
+  }
+  mesh.object_of_triangle.insert(mesh.object_of_triangle.end(), object_of_triangle.begin(),
+                                 object_of_triangle.end());
+}
+
 void MeshBuilder::add_collision_box(std::uint32_t object, const Pose& X_WS,
                                     const Vec3& half_extent) {
   world_.collision_shapes.push_back({CollisionShape::Kind::kBox, X_WS, half_extent, object});
@@ -339,6 +355,7 @@ std::uint64_t world_hash(const World& world) {
   for (const Object& object : world.objects) {
     hash.add(static_cast<std::uint64_t>(object.surface_class));
     hash.add(object.reflectivity);
+    if (object.felt) hash.add(std::uint64_t{1});
   }
   for (const CollisionShape& shape : world.collision_shapes) {
     hash.add(static_cast<std::uint64_t>(shape.kind));

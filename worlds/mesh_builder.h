@@ -19,9 +19,10 @@ class MeshBuilder {
   static constexpr std::uint32_t kMaxChunkTriangles = 4000;
 
   /// Registers a thing of the world; returns its id. @pre reflectivity in [0, 1].
-  std::uint32_t add_object(SurfaceClass surface_class, double reflectivity);
+  /// @param felt the vehicle touches its triangles
+  std::uint32_t add_object(SurfaceClass surface_class, double reflectivity, bool felt = false);
 
-  // Surfaces: seen by the sensors, not felt.
+  // Surfaces: seen by the sensors; felt only where their object is.
 
   void add_triangle(std::uint32_t object, const Vec3& a, const Vec3& b, const Vec3& c);
   /// Corners in order around the quad.
@@ -43,6 +44,10 @@ class MeshBuilder {
   /// A convex outline in P's xy plane (in order around it), from z = low to z = high, closed.
   void add_prism(std::uint32_t object, const Pose& X_WP, std::span<const Vec2> outline, double low,
                  double high);
+  /// Many triangles at once. @pre their corners are indices into `vertices`.
+  void add_mesh(std::span<const Vec3> vertices,
+                std::span<const std::array<std::uint32_t, 3>> triangles,
+                std::span<const std::uint32_t> object_of_triangle);
   /// The surface of `terrain`, which also becomes World::terrain.
   void add_height_field(std::uint32_t object, HeightField terrain);
 

@@ -213,6 +213,39 @@ std::vector<float> squared_distances(const OccupancyGrid& occupancy) {
   return distance;
 }
 
+// Run by run along x: what lies beside a run is looked at once, not cell by cell.
+std::size_t flood(FreeSpace& space, const Eigen::Vector3i& start) {
+  const GridGeometry& grid = space.grid;
+  if (!grid.contains(start)) return 0;
+  const auto is_open = [&space](std::size_t i) { return space.passable[i] && !space.reachable[i]; };
+  std::vector<Eigen::Vector3i> open{start};
+  std::size_t count = 0;
+  while (!open.empty()) {
+    const Eigen::Vector3i seed = open.back();
+    open.pop_back();
+    const std::size_t row = grid.index({0, seed.y(), seed.z()});
+    if (!is_open(row + static_cast<std::size_t>(seed.x()))) continue;
+    int first = seed.x(), last = seed.x();
+    while (first > 0 && is_open(row + static_cast<std::size_t>(first - 1))) --first;
+    while (last + 1 < grid.size.x() && is_open(row + static_cast<std::size_t>(last + 1))) ++last;
+    for (int x = first; x <= last; ++x) space.reachable[row + static_cast<std::size_t>(x)] = 1;
+    count += static_cast<std::size_t>(last - first + 1);
+    for (const auto& [dy, dz] :
+         {std::pair(-1, 0), std::pair(1, 0), std::pair(0, -1), std::pair(0, 1)}) {
+      const Eigen::Vector3i beside(first, seed.y() + dy, seed.z() + dz);
+      if (!grid.contains(beside)) continue;
+      const std::size_t other = grid.index({0, beside.y(), beside.z()});
+      bool in_run = false;
+      for (int x = first; x <= last; ++x) {
+        const bool here = is_open(other + static_cast<std::size_t>(x));
+        if (here && !in_run) open.emplace_back(x, beside.y(), beside.z());
+        in_run = here;
+      }
+    }
+  }
+  return count;
+}
+
 FreeSpace flood_free_space(const OccupancyGrid& occupancy, const Vec3& start, double radius_m) {
   const GridGeometry& grid = occupancy.grid;
   FreeSpace space{grid, std::vector<std::uint8_t>(grid.cells(), 0),
@@ -227,25 +260,7 @@ FreeSpace flood_free_space(const OccupancyGrid& occupancy, const Vec3& start, do
                    [](std::uint8_t occupied) { return static_cast<std::uint8_t>(!occupied); });
   }
 
-  const Eigen::Vector3i start_cell = grid.cell_of(start);
-  if (!grid.contains(start_cell) || !space.passable[grid.index(start_cell)]) return space;
-  std::vector<Eigen::Vector3i> open{start_cell};
-  space.reachable[grid.index(start_cell)] = 1;
-  while (!open.empty()) {
-    const Eigen::Vector3i cell = open.back();
-    open.pop_back();
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const int step : {-1, 1}) {
-        Eigen::Vector3i next = cell;
-        next[axis] += step;
-        if (!grid.contains(next)) continue;
-        const std::size_t index = grid.index(next);
-        if (space.reachable[index] || !space.passable[index]) continue;
-        space.reachable[index] = 1;
-        open.push_back(next);
-      }
-    }
-  }
+  flood(space, grid.cell_of(start));
   return space;
 }
 

@@ -89,6 +89,10 @@ struct FreeSpace {
   }
 };
 
+/// Marks what can be reached over face neighbours from a passable cell, besides what is marked
+/// already. @return the number of cells that were added
+std::size_t flood(FreeSpace& space, const Eigen::Vector3i& start);
+
 /// Flood fill over face neighbours. The sphere fits where the cell's centre is further than
 /// `radius_m` from the centre of every occupied cell: half a cell of tolerance either way on
 /// average. Nothing is reachable if it does not fit at the start.

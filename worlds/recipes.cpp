@@ -15,27 +15,13 @@ constexpr double kCheckedHeight = 3.0;   // the flood's ceiling above the pad, m
 constexpr double kResolution = 0.2;      // m; conservative cells make every gap narrower by this
 constexpr double kReachableShare = 0.5;  // of the free space, at least
 
-World build_unchecked(const WorldConfig& config, std::uint64_t seed) {
-  switch (config.kind) {
-    case WorldKind::kForest:
-      return build_forest(config.forest, seed);
-    case WorldKind::kGarage:
-      return build_garage(config.garage, seed);
-    case WorldKind::kGaps:
-      return build_gaps(config.gaps, seed);
-    case WorldKind::kEmpty:
-      return build_empty(config.empty, seed);
-  }
-  throw ConfigError("unknown kind of world");
-}
-
-/// What the start must give access to. In the garage that is the storey, not the air over its roof;
-/// in front of the wall of `gaps`, for whether the gap can be passed is the experiment.
+/// What the start must give access to.
 Bounds region_to_reach(const WorldConfig& config, const World& world) {
   Bounds region = world.bounds;
   region.high.z() = std::min(region.high.z(), world.X_WS.p.z() + kCheckedHeight);
-  if (config.kind == WorldKind::kGarage) region.high.z() = config.garage.ceiling_z_m;
-  if (config.kind == WorldKind::kGaps) region.high.x() = config.gaps.wall_distance_m;
+  with_recipe(config, [&](const auto& recipe) {
+    if constexpr (requires { recipe.limit_reach(region); }) recipe.limit_reach(region);
+  });
   return region;
 }
 
@@ -81,7 +67,10 @@ double reachable_share(const World& world, const Bounds& region, double radius_m
 }  // namespace
 
 World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m) {
-  World world = build_unchecked(config, seed);
+  if (config.kind == WorldKind::kFile) {
+    return load_file_world(config.file, vehicle_radius_m).world;
+  }
+  World world = with_recipe(config, [&](const auto& recipe) { return build(recipe, seed); });
   const double share = reachable_share(world, region_to_reach(config, world), vehicle_radius_m);
   if (share < kReachableShare) {
     const std::string name(enum_names(config.kind)[static_cast<std::size_t>(config.kind)]);
@@ -94,25 +83,20 @@ World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_
   return world;
 }
 
-Eigen::AlignedBox2d extent_of(const WorldConfig& config) {
-  const auto centred = [](const Vec2& size) {
-    return Eigen::AlignedBox2d(Vec2(-0.5 * size), Vec2(0.5 * size));
-  };
-  switch (config.kind) {
-    case WorldKind::kForest:
-      return centred(config.forest.size_m);
-    case WorldKind::kGarage:
-      return {Vec2(0, -0.5 * config.garage.width_m),
-              Vec2(config.garage.length_m, 0.5 * config.garage.width_m)};
-    case WorldKind::kGaps: {
-      const GapsRecipe& gaps = config.gaps;
-      return {Vec2(-gaps.start_radius_m, -0.5 * gaps.width_m),
-              Vec2(gaps.length_m - gaps.start_radius_m, 0.5 * gaps.width_m)};
+Eigen::AlignedBox2d extent_of(const FileWorld& loaded) {
+  const Pose X_SW = loaded.world.X_WS.inverse();
+  Eigen::AlignedBox2d box;
+  for (const double x : {loaded.reachable.low.x(), loaded.reachable.high.x()}) {
+    for (const double y : {loaded.reachable.low.y(), loaded.reachable.high.y()}) {
+      box.extend((X_SW * Vec3(x, y, loaded.world.X_WS.p.z())).head<2>());
     }
-    case WorldKind::kEmpty:
-      return centred(config.empty.size_m);
   }
-  throw ConfigError("unknown kind of world");
+  return box;
+}
+
+std::optional<Eigen::AlignedBox2d> extent_of(const WorldConfig& config) {
+  if (config.kind == WorldKind::kFile) return {};
+  return with_recipe(config, [](const auto& recipe) { return recipe.extent(); });
 }
 
 }  // namespace arex::worlds

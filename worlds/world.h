@@ -8,9 +8,9 @@
 #include "math/pose.h"
 #include "math/types.h"
 
-/// Procedural worlds: a recipe and a seed give one labelled triangle mesh, a few collision shapes
-/// and the free space. Built once, constant after; Embree, the depth renderer, the physics, the
-/// scorer and the exporter all read this one value. Frame W: z up, m.
+/// Worlds: a recipe and a seed, or somebody's file, give one labelled triangle mesh, a few
+/// collision shapes and the free space. Built once, constant after; Embree, the depth renderer, the
+/// physics, the scorer and the exporter all read this one value. Frame W: z up, m.
 namespace arex::worlds {
 
 enum class SurfaceClass : std::uint8_t {
@@ -34,12 +34,14 @@ enum class SurfaceClass : std::uint8_t {
 inline constexpr std::array<std::string_view, 16> kSurfaceClassNames{
     "ground", "trunk",   "branch", "leaf", "shrub", "log", "floor", "ramp",
     "wall",   "ceiling", "pillar", "beam", "pipe",  "car", "kerb",  "door"};
+constexpr const auto& enum_names(SurfaceClass) { return kSurfaceClassNames; }
 
 /// One thing of the world: a tree's trunk, one car, the ground. Its id is its index in
 /// World::objects.
 struct Object {
   SurfaceClass surface_class = SurfaceClass::kGround;
   float reflectivity = 0.3F;  ///< diffuse, at 905 nm, 0..1
+  bool felt = false;  ///< the vehicle touches its triangles; otherwise its collision shapes, if any
 };
 
 /// A contiguous range of triangles that lie close together: the unit of culling.

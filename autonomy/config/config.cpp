@@ -270,7 +270,7 @@ void apply_override(ConfigNode& root, const std::string& assignment) {
                                      config_detail::Positions::kName));
 }
 
-std::string given_last(const ConfigNode& section) {
+std::string last_given(const ConfigNode& section) {
   const ConfigNode* newest = &section;
   const auto visit = [&newest](const auto& self, const ConfigNode& node) -> void {
     if (node.order > newest->order) newest = &node;
@@ -319,6 +319,21 @@ void expect_length(const ConfigNode& node, std::string_view key, std::size_t len
     fail(node.where, "'" + std::string(key) + "' has " + std::to_string(node.items.size()) +
                          " items, expected " + expected);
   }
+}
+
+const ConfigNode* find_dotted(const ConfigNode& root, std::string_view dotted_key) {
+  const ConfigNode::Entry* entry = find_entry(root, dotted_key);
+  return entry ? &entry->value : nullptr;
+}
+
+void expect_name(const ConfigNode::Entry& entry) {
+  constexpr std::size_t kLongest = 40;
+  const bool plain = std::all_of(entry.key.begin(), entry.key.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  });
+  if (plain && !entry.key.empty() && entry.key.size() <= kLongest) return;
+  fail(entry.where, "the name '" + shortened(entry.key) +
+                        "', expected at most 40 letters, digits and underscores");
 }
 
 void parse_scalar(const ConfigNode& node, std::string_view key, bool& out) {

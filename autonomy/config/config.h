@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -15,14 +16,15 @@
 /// Strict configuration: YAML <-> struct. A config struct lists its fields once, in
 ///
 ///     void fields(auto& f) {
-///       f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+///       f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, III-A)");
 ///       f.check(inflation_m >= 0, "inflation_m >= 0");
 ///     }
 ///
 /// and reading, writing, `arex params` and `--set` all come from that list. The default member
 /// initialiser is the only home of the number. Field types: bool, int, std::uint64_t, double,
-/// std::string, Vec2, Vec3, enums with an `enum_names` overload, std::vector of any of these, and
-/// nested config structs. Units are the name's suffix (_m, _mps, _rad, _hz, ...).
+/// std::string, Vec2, Vec3, enums with an `enum_names` overload, std::vector of any of these,
+/// nested config structs, std::map of those by a name that the user gives, and sections whose keys
+/// depend on what they say (OpenSection). Units are the name's suffix (_m, _mps, _rad, _hz, ...).
 namespace arex {
 
 /// Bad input. what() is one printable line, `FILE:LINE: what is wrong, what is expected`.
@@ -64,7 +66,7 @@ void set_value(ConfigNode& root, const std::string& dotted_key, const std::strin
 void apply_override(ConfigNode& root, const std::string& assignment);
 
 /// Where the newest value of a section was given: the last override in it, or else the section.
-std::string given_last(const ConfigNode& section);
+std::string last_given(const ConfigNode& section);
 
 /// One parameter, as `arex params` prints it.
 struct ParameterInfo {
@@ -77,6 +79,13 @@ struct ParameterInfo {
 template <class T>
 concept ConfigEnum = std::is_enum_v<T> && requires(T t) {
   enum_names(t).size();
+};
+
+/// A section that reads and lists itself, because its keys depend on its name or a type in it.
+template <class T>
+concept OpenSection = requires(T section, const T& listed, const ConfigNode& node) {
+  section.read(std::string_view(), node);  // name and content; throws ConfigError
+  { listed.parameters() } -> std::same_as<std::vector<ParameterInfo>>;
 };
 
 namespace config_detail {
@@ -92,11 +101,17 @@ std::size_t parse_choice(const ConfigNode& node, std::string_view key,
 void expect_kind(const ConfigNode& node, std::string_view key, ConfigNode::Kind kind,
                  std::string_view expected);
 void expect_length(const ConfigNode& node, std::string_view key, std::size_t length);
+/// A name that the user gives: letters, digits and _, at most 40, so that files and dotted keys can
+/// be made of it.
+void expect_name(const ConfigNode::Entry& entry);
 /// Throws for the first key of `node` that is not in `known`, naming the nearest known one.
 void reject_unknown(const ConfigNode& node, const std::vector<std::string>& known);
 /// Where the value that a broken rule speaks of was given: of the keys that the rule names (dotted
 /// from here) the one that an override gave last, or else the first.
 std::string locate_rule(const ConfigNode& node, std::string_view rule);
+
+/// What stands at a dotted key; null if nothing does.
+const ConfigNode* find_dotted(const ConfigNode& root, std::string_view dotted_key);
 
 std::string format_scalar(bool value);
 std::string format_scalar(int value);
@@ -109,6 +124,10 @@ template <class T>
 inline constexpr bool kIsVector = false;
 template <class T>
 inline constexpr bool kIsVector<std::vector<T>> = true;
+template <class T>
+inline constexpr bool kIsMap = false;
+template <class T>
+inline constexpr bool kIsMap<std::map<std::string, T>> = true;
 template <class T>
 inline constexpr bool kIsEigen = std::is_same_v<T, Vec2> || std::is_same_v<T, Vec3>;
 template <class T>
@@ -159,6 +178,15 @@ void read_value(const ConfigNode& node, std::string_view key, T& value) {
     expect_kind(node, key, ConfigNode::Kind::kSequence, "a list [..]");
     value.clear();
     for (const ConfigNode& item : node.items) read_value(item, key, value.emplace_back());
+  } else if constexpr (kIsMap<T>) {
+    expect_kind(node, key, ConfigNode::Kind::kMap, "a map of sections by name");
+    for (const ConfigNode::Entry& entry : node.entries) {
+      expect_name(entry);
+      read_value(entry.value, entry.key, value[entry.key]);
+    }
+  } else if constexpr (OpenSection<T>) {
+    expect_kind(node, key, ConfigNode::Kind::kMap, "a map of keys");
+    value.read(key, node);
   } else {
     expect_kind(node, key, ConfigNode::Kind::kMap, "a map of keys");
     Reader reader(node);
@@ -228,6 +256,21 @@ class Lister {
     if constexpr (kIsScalar<T> || ConfigEnum<T> || kIsEigen<T> || kIsVector<T>) {
       out_.push_back(
           {key, format_value(value), unit_of(name), std::string(meaning) + choices(value)});
+    } else if constexpr (kIsMap<T>) {
+      if (value.empty()) {
+        out_.push_back({key, "{}", "", std::string(meaning)});
+        return;
+      }
+      if (sections_) out_.push_back({key, "", "", std::string(meaning)});
+      Lister nested(key + ".", out_, sections_);
+      for (auto& [given, section] : value) nested(given, section, "");
+    } else if constexpr (OpenSection<T>) {
+      if (sections_) out_.push_back({key, "", "", std::string(meaning)});
+      for (ParameterInfo& leaf : value.parameters()) {
+        if (leaf.value.empty() && !sections_) continue;
+        leaf.key = key + "." + leaf.key;
+        out_.push_back(std::move(leaf));
+      }
     } else {
       if (sections_) out_.push_back({key, "", "", std::string(meaning)});
       Lister nested(key + ".", out_, sections_);
@@ -267,6 +310,18 @@ std::vector<ParameterInfo> describe_parameters(T config) {
   config_detail::Lister lister("", out, true);
   config.fields(lister);
   return out;
+}
+
+/// Only those that a section gives, validated.
+template <class T>
+std::vector<ParameterInfo> given_parameters(const ConfigNode& section) {
+  T config;
+  read_config(section, config);
+  std::vector<ParameterInfo> given = list_parameters(config);
+  std::erase_if(given, [&](const ParameterInfo& parameter) {
+    return config_detail::find_dotted(section, parameter.key) == nullptr;
+  });
+  return given;
 }
 
 /// The block YAML of a list of parameters; reading it back gives the same bits.

@@ -25,7 +25,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 // A name that continues or shortens another is what people mean even when the distance is large:
 // 'inflation' for 'inflation_m'.
-std::size_t unlikeness(std::string_view given, std::string_view known) {
+std::size_t dissimilarity(std::string_view given, std::string_view known) {
   const bool prefix = known.starts_with(given) || given.starts_with(known);
   return edit_distance(given, known) / (prefix ? 4 : 1);
 }
@@ -35,7 +35,7 @@ std::size_t unlikeness(std::string_view given, std::string_view known) {
 std::string nearest(std::string_view given, const std::vector<std::string>& known) {
   given = given.substr(0, kLongest);
   return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return unlikeness(given, a) < unlikeness(given, b);
+    return dissimilarity(given, a) < dissimilarity(given, b);
   });
 }
 

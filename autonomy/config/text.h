@@ -13,7 +13,7 @@ namespace arex {
 std::optional<char32_t> take_utf8(std::string_view text, std::size_t& at);
 
 /// The same text on one line and without a byte that a terminal could obey: control characters,
-/// what turns the direction of writing, and what is no UTF-8 become \xNN.
+/// what turns the direction of writing, and what is no UTF-8 become `\xNN`.
 std::string printable(std::string_view text);
 
 /// The first so many bytes, and "..." in the place of the rest.

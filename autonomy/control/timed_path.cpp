@@ -45,8 +45,6 @@ void TimedPath::land_to(double z_m) {
   append({p_.x(), p_.y(), z_m}, config_.landing_speed_mps, yaw_, 0);
 }
 
-void TimedPath::turn_to(double yaw_rad) { append(p_, config_.max_speed_mps, yaw_rad, 0); }
-
 void TimedPath::wait(double duration_s) { append(p_, config_.max_speed_mps, yaw_, duration_s); }
 
 void TimedPath::append(const Vec3& p_O, double speed_mps, double yaw_rad, double duration_s) {

@@ -54,8 +54,6 @@ class TimedPath {
   void climb_to(double z_m);
   /// The same at landing speed. A target below the ground takes the thrust away after touchdown.
   void land_to(double z_m);
-  /// Turns in place.
-  void turn_to(double yaw_rad);
   /// Stays.
   void wait(double duration_s);
 

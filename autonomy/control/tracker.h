@@ -18,7 +18,7 @@ struct TrackerConfig {
   double observer_bandwidth_radps = 1.5;
   double observer_limit_n = 4.0;  ///< a fifth of the weight
   double attitude_lag_s = 0.15;   ///< from the demanded force to the real one
-  double rate_hz = 100;           ///< paper, IV
+  double rate_hz = 100;           ///< paper, III-A
 
   void fields(auto& f) {
     f("position_gain", position_gain, "kx: force per position error, N/m");
@@ -30,7 +30,7 @@ struct TrackerConfig {
     f("observer_bandwidth_radps", observer_bandwidth_radps, "of the disturbance observer");
     f("observer_limit_n", observer_limit_n, "largest disturbance it believes, each axis");
     f("attitude_lag_s", attitude_lag_s, "time constant from demanded to real force");
-    f("rate_hz", rate_hz, "how often the tracker runs (paper, IV)");
+    f("rate_hz", rate_hz, "how often the tracker runs (paper, III-A)");
     f.check(tilt_limit_rad > 0 && tilt_limit_rad < 1.5, "0 < tilt_limit_rad < 1.5");
     f.check(min_lift_fraction > 0 && min_lift_fraction < 1, "0 < min_lift_fraction < 1");
     f.check(max_lift_fraction > 1, "max_lift_fraction > 1");

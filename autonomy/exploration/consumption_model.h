@@ -7,14 +7,14 @@
 namespace arex {
 
 struct ConsumptionConfig {
-  double capacity_wh = 59.2;           ///< 4S 4000 mAh (reference.md, section 1)
-  double internal_resistance = 0.028;  ///< ohm, with wiring (reference.md, section 1)
-  // At rest (reference.md, section 1): linear from full to middle and from middle to empty.
+  double capacity_wh = 59.2;           ///< 4S 4000 mAh (models/arex/README.md)
+  double internal_resistance = 0.028;  ///< ohm, with wiring (likewise)
+  // At rest (likewise): linear from full to middle and from middle to empty.
   double full_v = 16.8;
   double middle_v = 14.8;
   double empty_v = 13.2;
   double middle_charge = 5.0 / 9.0;
-  double prior_power_w = 258;  ///< hover (reference.md, section 1)
+  double prior_power_w = 258;  ///< hover (likewise)
   double prior_weight_s = 20;
   double speed_bin_mps = 0.5;
 

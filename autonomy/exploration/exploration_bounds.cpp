@@ -18,7 +18,7 @@ bool is_between(const Vec2& a, const Vec2& b, const Vec2& c) {
 }
 
 /// Whether the closed segments ab and cd have a point in common.
-bool meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
+bool intersect(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   const double ca = turn(c, d, a), cb = turn(c, d, b), ac = turn(a, b, c), ad = turn(a, b, d);
   if (((ca > 0) != (cb > 0)) && ((ac > 0) != (ad > 0)) && ca != 0 && cb != 0 && ac != 0 && ad != 0)
     return true;
@@ -120,7 +120,7 @@ bool ExplorationBounds::is_simple() const {
     const Vec2& c = polygon_m[(i + 2) % n];
     if (turn(a, b, c) == 0 && (b - a).dot(c - b) < 0) return false;
     for (std::size_t j = i + 2; j < n; ++j) {
-      if ((j + 1) % n != i && meet(a, b, polygon_m[j], polygon_m[(j + 1) % n])) return false;
+      if ((j + 1) % n != i && intersect(a, b, polygon_m[j], polygon_m[(j + 1) % n])) return false;
     }
   }
   return true;

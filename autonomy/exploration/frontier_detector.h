@@ -80,7 +80,7 @@ class VertexSet {
 /// Points are clustered by mean shift, the member nearest to its mode standing for the cluster (the
 /// mode itself may lie in known space), and are kept from call to call while they are frontiers.
 /// Source: Umari and Mukhopadhyay, Autonomous robotic exploration based on multiple
-/// rapidly-exploring randomized trees, IROS 2017; paper.tex, Robot Exploration Module.
+/// rapidly-exploring randomized trees, IROS 2017; AREX paper, II-D.
 class FrontierDetector {
  public:
   FrontierDetector(const FrontierDetectorConfig& config, std::uint64_t seed);

@@ -8,10 +8,9 @@
 namespace arex {
 namespace {
 
-/// Whether something hangs over the floor of a column, or stands on it, lower than this.
-bool is_covered(const FloorMap& floor, std::size_t cell, double height_m, double resolution_m) {
-  return floor.overhead[cell] != FloorMap::kNothing &&
-         floor.overhead[cell] * resolution_m < height_m;
+/// Whether something hangs over the floor of a column, or stands on it, below this z in O.
+bool is_covered(const FloorMap& floor, std::size_t cell, double z_O, double resolution_m) {
+  return floor.overhead[cell] != FloorMap::kNothing && floor.overhead[cell] * resolution_m < z_O;
 }
 
 bool has_floor(const FloorMap& floor, std::size_t cell) {
@@ -36,16 +35,9 @@ LandingFinder::LandingFinder(const LandingConfig& config, const ExplorerConfig& 
       footing_m_(vehicle_radius_m + config.margin_m) {}
 
 LandingGround LandingFinder::assess(const OccupancyMap2D& map, const Vec3& p_O) const {
-  const Eigen::Vector2i cell = map.cell_of(p_O.head<2>());
-  if (!map.contains(cell) || map.floor.top.empty()) return LandingGround::kUnknown;
-  const double ground = map.ground.at(p_O.head<2>());
-  const double height = std::isfinite(ground) ? p_O.z() - ground : explorer_.flight_height_m;
-  return assess(map, p_O.head<2>(), height);
-}
-
-LandingGround LandingFinder::assess(const OccupancyMap2D& map, const Vec2& p,
-                                    double height_m) const {
+  const Vec2 p = p_O.head<2>();
   const Eigen::Vector2i centre = map.cell_of(p);
+  if (!map.contains(centre) || map.floor.top.empty()) return LandingGround::kUnknown;
   const int reach = static_cast<int>(std::ceil(footing_m_ / map.resolution));
   int cells = 0, seen = 0, unknown = 0, lowest = FloorMap::kNothing, highest = FloorMap::kUnknown;
   for (int dy = -reach; dy <= reach; ++dy) {
@@ -58,7 +50,7 @@ LandingGround LandingFinder::assess(const OccupancyMap2D& map, const Vec2& p,
         continue;
       }
       const std::size_t i = map.index(cell);
-      if (is_covered(map.floor, i, height_m + body_m_, map.resolution)) {
+      if (is_covered(map.floor, i, p_O.z() + body_m_, map.resolution)) {
         return LandingGround::kObstructed;
       }
       unknown += map.floor.top[i] == FloorMap::kUnknown;
@@ -79,8 +71,11 @@ LandingGround LandingFinder::assess(const OccupancyMap2D& map, const Vec2& p,
 std::vector<LandingFinder::Place> LandingFinder::reachable_places(
     const ExplorationSpace& space) const {
   const OccupancyMap2D& map = space.map();
+  const auto width = static_cast<std::size_t>(map.width);
   const auto covered = [&](std::size_t i) {
-    return is_covered(map.floor, i, explorer_.flight_height_m + body_m_, map.resolution);
+    const Vec2 p = map.centre_of({static_cast<int>(i % width), static_cast<int>(i / width)});
+    return is_covered(map.floor, i, at_flight_height(explorer_, p, map).z() + body_m_,
+                      map.resolution);
   };
   const auto from_covered = squared_distances(map.width, map.height, covered);
   const auto from_unclear = squared_distances(map.width, map.height, [&](std::size_t i) {
@@ -121,19 +116,22 @@ std::optional<LandingPlace> LandingFinder::find(const OccupancyMap2D& map, const
     return LandingPlace{kind, at_flight_height(explorer_, place->p, map)};
   };
   const double preferred_m = std::max(explorer_.stop.landing_clearance_m, footing_m_);
-  for (const auto& [kind, room_m] : {std::pair{LandingPlace::Kind::kClear, preferred_m},
-                                     {LandingPlace::Kind::kClear, footing_m_},
-                                     {LandingPlace::Kind::kToBeSeen, footing_m_}}) {
+  struct Demand {
+    LandingPlace::Kind kind;
+    double room_m;
+  };
+  for (const Demand demand : {Demand{LandingPlace::Kind::kClear, preferred_m},
+                              Demand{LandingPlace::Kind::kClear, footing_m_},
+                              Demand{LandingPlace::Kind::kToBeSeen, footing_m_}}) {
     if (query.last_resort) break;
+    const bool must_be_clear = demand.kind == LandingPlace::Kind::kClear;
     const auto place = std::find_if(places.begin(), places.end(), [&](const Place& p) {
-      if (p.room_m < room_m) return false;
-      const bool known = p.known_room_m >= footing_m_;
-      if (kind == LandingPlace::Kind::kClear && !known) return false;
-      const LandingGround ground = assess(map, p.p, explorer_.flight_height_m);
-      return kind == LandingPlace::Kind::kClear ? ground == LandingGround::kClear
-                                                : ground != LandingGround::kObstructed;
+      if (p.room_m < demand.room_m) return false;
+      if (must_be_clear && p.known_room_m < footing_m_) return false;
+      const LandingGround ground = assess(map, at_flight_height(explorer_, p.p, map));
+      return must_be_clear ? ground == LandingGround::kClear : ground != LandingGround::kObstructed;
     });
-    if (place != places.end()) return above(kind, place);
+    if (place != places.end()) return above(demand.kind, place);
   }
   const auto widest =
       std::max_element(places.begin(), places.end(),

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "exploration/explorer.h"
+#include "exploration/frontier_explorer.h"
 
 namespace arex {
 
@@ -61,7 +61,7 @@ class LandingFinder {
   LandingFinder(const LandingConfig& config, const ExplorerConfig& explorer,
                 double vehicle_radius_m);
 
-  /// The ground straight below p.
+  /// The ground straight below p, and the way down to it.
   [[nodiscard]] LandingGround assess(const OccupancyMap2D& map, const Vec3& p_O) const;
 
   /// The reachable place to which the way is the shortest: a clear one that is
@@ -74,8 +74,6 @@ class LandingFinder {
  private:
   struct Place;
   [[nodiscard]] std::vector<Place> reachable_places(const ExplorationSpace& space) const;
-  [[nodiscard]] LandingGround assess(const OccupancyMap2D& map, const Vec2& p,
-                                     double height_m) const;
 
   LandingConfig config_;
   ExplorerConfig explorer_;

@@ -57,7 +57,7 @@ struct TargetHistory {
 
 /// Fills f_D and R_d (or R) of a candidate whose f_I, f_N and A are known:
 /// R = lambda_I f_I - lambda_N f_N and R_d = R - exp(lambda_D A), with f_D = 1 where there is no A
-/// (paper, Evaluation Strategy).
+/// (paper, eqs. (24)-(25)).
 void evaluate_revenue(Candidate& candidate, const RevenueConfig& config);
 
 /// Index of the kept candidate with the largest revenue, the first of equals; none without any.

@@ -20,7 +20,7 @@ inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_ca
 
 struct StopConfig {
   double min_area_m2 = 0.3;
-  double reserve_fraction = 0.2;       ///< reference.md, section 1: 80 % discharge
+  double reserve_fraction = 0.2;       ///< 80 % discharge (models/arex/README.md)
   double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
   bool return_home = true;             ///< handed down from mission.land_at_start
   double return_speed_mps = 1.0;  ///< handed down: the fraction of planning.local's speed limit

@@ -104,7 +104,7 @@ bool DiskError::disk_full() const {
   return false;
 }
 
-bool speaks_of_a_full_disk(std::string_view text) {
+bool names_full_disk(std::string_view text) {
   for (const int reason : kFull) {
     if (text.find(std::strerror(reason)) != std::string_view::npos) return true;
   }

@@ -25,7 +25,7 @@ class DiskError : public std::runtime_error {
 };
 
 /// Whether a text names, in the system's words, a reason for which disk_full() holds.
-bool speaks_of_a_full_disk(std::string_view text);
+bool names_full_disk(std::string_view text);
 
 /// Throws if an output of this name could not be written now, and leaves nothing behind. Before the
 /// work, what would fail after it costs nothing.

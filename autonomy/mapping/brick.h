@@ -26,6 +26,14 @@ struct CellBox {
   [[nodiscard]] Cell size() const { return high - low; }
 };
 
+/// A brick in which voxels changed their state (unknown, free, occupied).
+struct BrickChange {
+  Cell brick = Cell::Zero();
+  const BrickMask* known = nullptr;
+  const BrickMask* occupied = nullptr;  ///< within known
+  BrickMask changed{};
+};
+
 /// Spreads the bits of v: bit i goes to bit 3 i.
 constexpr std::uint64_t spread_bits(std::uint64_t v) {
   std::uint64_t out = 0;

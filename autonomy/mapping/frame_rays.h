@@ -14,7 +14,7 @@ namespace arex {
 void cast_frame(const RegisteredScan& scan, double range_m, const VehicleConfig& vehicle,
                 const CellBox& clip, RayCaster& rays, double lone_range_m = 0);
 
-/// Casts a depth frame, thinned and cut as the config says; the vehicle's own body is left out.
+/// Casts a depth frame, downsampled and cut as the config says; the vehicle's own body is left out.
 void cast_frame(const RegisteredDepth& depth, const LocalGridConfig& config,
                 const VehicleConfig& vehicle, const CellBox& clip, RayCaster& rays);
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mapping/height_band.h"
+#include "mapping/log_odds.h"
 #include "mapping/mapping_config.h"
 #include "mapping/occupancy_map_2d.h"
 #include "mapping/ray_caster.h"
@@ -14,11 +15,11 @@
 namespace arex {
 
 /// The map of the whole mission inside the exploration bounds, in O: log-odds of every voxel that
-/// was seen, an octree of their states, and the 2D occupancy of the exploration (paper,
+/// was seen, and the 2D occupancy of the exploration (paper,
 /// Environmental Modelling). OctoMap's sensor model: same states after the same frames.
 ///
 /// Log-odds lie in bricks of 8^3 voxels as 16-bit integers in units of 2^-12; only voxels whose
-/// state (unknown, free, occupied) changes go into the octree and the 2D map.
+/// state (unknown, free, occupied) changes go into the 2D map.
 class GlobalMap {
  public:
   GlobalMap(const GlobalMapConfig& config, double resolution_m);
@@ -30,7 +31,8 @@ class GlobalMap {
   /// -1 unknown, 0 free, 1 occupied; unknown outside the bounds.
   [[nodiscard]] int state(const Cell& cell) const;
   [[nodiscard]] const OccupancyMap2D& occupancy_2d() const { return refreshed_band().map(); }
-  [[nodiscard]] const StateTree& tree() const { return tree_; }
+  /// The states as OctoMap's tree.
+  [[nodiscard]] StateTree octree() const;
   /// Volume known so far, m^3.
   [[nodiscard]] double known_volume() const;
 
@@ -54,7 +56,7 @@ class GlobalMap {
     BrickMask moved;  ///< voxels whose log-odds this changes
   };
   [[nodiscard]] std::size_t slot_of(const Cell& brick) const;
-  void weigh(Look& look) const;
+  void apply_evidence(Look& look) const;
   void update(const Look& look);
   [[nodiscard]] const HeightBand& refreshed_band() const;
 
@@ -62,10 +64,10 @@ class GlobalMap {
   CellBox box_;
   Cell brick_low_;
   Cell brick_count_;
-  std::int16_t hit_units_, miss_units_, min_units_, max_units_;
+  SensorModelConfig sensor_;
+  LogOddsSteps steps_;
   std::vector<std::unique_ptr<Brick>> bricks_;  ///< null: nothing seen
-  StateTree tree_;
-  mutable HeightBand band_;  ///< brought up to date when it is asked for
+  mutable HeightBand band_;                     ///< brought up to date when it is asked for
   std::size_t known_voxels_ = 0;
   std::vector<BrickChange> changes_;
 };

@@ -11,7 +11,7 @@ namespace arex {
 /// One byte per cell: bit 0 occupied, bit 1 inside the inflation, bit 2 known (seen free or
 /// occupied), bit 3 barred (above the flight's ceiling or below its floor; inflated, too). Index as
 /// the paper's Id_i: (h * num_w + w) * num_l + l with l along y, w along x, h along z (paper,
-/// Environment Representation).
+/// eqs. (11)-(12)).
 struct GridView {
   static constexpr std::uint8_t kOccupied = 1;
   static constexpr std::uint8_t kInflated = 2;

@@ -1,11 +1,11 @@
 #include "mapping/height_band.h"
 
-#include <immintrin.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+
+#include "mapping/bits.h"
 
 namespace arex {
 namespace {
@@ -58,7 +58,7 @@ std::uint64_t HeightBand::layer(const BrickMask& mask, int z) {
   const std::size_t half = z >= 4 ? 4 : 0;
   std::uint64_t out = 0;
   for (std::size_t quadrant = 0; quadrant < 4; ++quadrant) {
-    out |= _pext_u64(mask[half + quadrant] >> shift, 0x0f0f0f0fU) << (16 * quadrant);
+    out |= gather_bits(mask[half + quadrant] >> shift, 0x0f0f0f0fU) << (16 * quadrant);
   }
   return out;
 }
@@ -132,8 +132,8 @@ void HeightBand::spread_ground() {
 std::size_t HeightBand::cell_of_bit(std::size_t t, unsigned bit) const {
   const Eigen::Vector2i tile(static_cast<int>(t) % brick_count_.x(),
                              static_cast<int>(t) / brick_count_.x());
-  const Eigen::Vector2i in(static_cast<int>(_pext_u32(bit, 0x15)),
-                           static_cast<int>(_pext_u32(bit, 0x2a)));
+  const Eigen::Vector2i in(static_cast<int>(gather_bits(bit, 0x15)),
+                           static_cast<int>(gather_bits(bit, 0x2a)));
   const Eigen::Vector2i cell =
       (brick_low_.head<2>() + tile) * kBrickCells + in - box_.low.head<2>();
   return map_.contains(cell) ? map_.index(cell) : map_.cells.size();

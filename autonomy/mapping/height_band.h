@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "mapping/brick.h"
 #include "mapping/mapping_config.h"
 #include "mapping/occupancy_map_2d.h"
-#include "mapping/state_tree.h"
 
 namespace arex {
 

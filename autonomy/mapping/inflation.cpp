@@ -10,29 +10,29 @@ namespace {
 constexpr double kRounding = 1e-6;
 
 /// row |= row shifted by s bits, 0 < s < 64, towards higher (or lower) positions.
-void smear_up(std::uint64_t* row, int words, int s) {
+void dilate_up(std::uint64_t* row, int words, int s) {
   for (int i = words - 1; i > 0; --i) row[i] |= row[i] << s | row[i - 1] >> (64 - s);
   row[0] |= row[0] << s;
 }
-void smear_down(std::uint64_t* row, int words, int s) {
+void dilate_down(std::uint64_t* row, int words, int s) {
   for (int i = 0; i + 1 < words; ++i) row[i] |= row[i] >> s | row[i + 1] << (64 - s);
   row[words - 1] |= row[words - 1] >> s;
 }
 
-/// Calls smear(s) with steps that double up to all shifts of 0..n.
-template <class Smear>
-void in_doubling_steps(int n, const Smear& smear) {
+/// Calls dilate(s) with steps that double up to all shifts of 0..n.
+template <class Dilate>
+void for_doubling_shifts(int n, const Dilate& dilate) {
   for (int done = 1; done <= n;) {
     const int s = std::min(done, n + 1 - done);
-    smear(s);
+    dilate(s);
     done += s;
   }
 }
 
 /// Expands one row by -n..n.
 void dilate_row(std::uint64_t* row, int words, int n) {
-  in_doubling_steps(n, [&](int s) { smear_up(row, words, s); });
-  in_doubling_steps(n, [&](int s) { smear_down(row, words, s); });
+  for_doubling_shifts(n, [&](int s) { dilate_up(row, words, s); });
+  for_doubling_shifts(n, [&](int s) { dilate_down(row, words, s); });
 }
 
 /// Expands a line of `count` blocks of `block` words, `stride` words apart, by -n..n blocks.
@@ -42,10 +42,10 @@ void dilate_blocks(std::uint64_t* data, int count, int block, int stride, int n)
     const std::uint64_t* const b = data + static_cast<std::ptrdiff_t>(from) * stride;
     for (int i = 0; i < block; ++i) a[i] |= b[i];
   };
-  in_doubling_steps(n, [&](int s) {
+  for_doubling_shifts(n, [&](int s) {
     for (int k = count - 1; k >= s; --k) merge(k, k - s);
   });
-  in_doubling_steps(n, [&](int s) {
+  for_doubling_shifts(n, [&](int s) {
     for (int k = 0; k + s < count; ++k) merge(k, k + s);
   });
 }

@@ -30,7 +30,7 @@ struct BitGrid {
   }
 };
 
-/// Expands obstacles by lambda_inflat (paper, Environment Representation).
+/// Expands obstacles by lambda_inflat (paper, eq. (13)).
 ///
 /// kCubic: the offsets -n..n along each axis, n = ceil(lambda / size). For a lambda on the grid
 /// that is the paper's point set with a, b, c in 0..2n; the printed n_step = n would cover one

@@ -1,11 +1,10 @@
 #include "mapping/local_grid.h"
 
-#include <immintrin.h>
-
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
+
+#include "mapping/bits.h"
 
 namespace arex {
 namespace {
@@ -36,6 +35,7 @@ constexpr std::size_t kBlock = 32;  ///< cells handled at a time
 /// What `n` cells in a row are, a bit each. Reads whole blocks, up to kBlock - 1 cells more.
 void classify(const std::int8_t* evidence, const std::uint8_t* frames, int n,
               std::uint64_t* occupied, std::uint64_t* known) {
+#if AREX_VECTOR
   const __m256i zero = _mm256_setzero_si256();
   const __m256i unseen = _mm256_set1_epi8(kUnseen);
   const __m256i count = _mm256_set1_epi8(static_cast<char>(kFrameCount));
@@ -64,6 +64,17 @@ void classify(const std::int8_t* evidence, const std::uint8_t* frames, int n,
     occupied[i / 64] = full;
     known[i / 64] = seen;
   }
+#else
+  std::fill_n(occupied, (n + 63) / 64, 0);
+  std::fill_n(known, (n + 63) / 64, 0);
+  for (int i = 0; i < n; ++i) {
+    const bool confirmed = (frames[i] & kConfirmed) != 0;
+    const bool full = (frames[i] & kFrameCount) != 0 || (confirmed && evidence[i] >= 0);
+    const bool free = evidence[i] < 0 && evidence[i] != kUnseen;
+    occupied[i / 64] |= std::uint64_t{full} << (i % 64);
+    known[i / 64] |= std::uint64_t{full || free} << (i % 64);
+  }
+#endif
 }
 
 /// In a cube of 4^3 voxels the rows along y: mask[x + 4 z].
@@ -96,6 +107,7 @@ void rotate_row(const std::vector<std::uint64_t>& in, int n, int first, std::uin
 /// The flags of `n` cells from their bits.
 void write_flags(const std::uint64_t* occupied, const std::uint64_t* inflated,
                  const std::uint64_t* known, int n, std::uint8_t* flags) {
+#if AREX_VECTOR
   const __m256i byte_of = _mm256_setr_epi8(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2,
                                            2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3);
   const __m256i bit_of = _mm256_set1_epi64x(static_cast<long long>(0x8040201008040201ULL));
@@ -117,6 +129,16 @@ void write_flags(const std::uint64_t* occupied, const std::uint64_t* inflated,
       std::copy_n(rest.begin(), n - i, flags + i);
     }
   }
+#else
+  for (int i = 0; i < n; ++i) {
+    const auto flag = [&](const std::uint64_t* row, unsigned value) {
+      return (row[i / 64] >> (i % 64) & 1U) != 0 ? value : 0U;
+    };
+    flags[i] = static_cast<std::uint8_t>(flag(occupied, GridView::kOccupied) |
+                                         flag(inflated, GridView::kInflated) |
+                                         flag(known, GridView::kKnown));
+  }
+#endif
 }
 
 }  // namespace
@@ -248,7 +270,7 @@ void LocalGrid::pass(const BrickRays& rays, const BrickMask& inside) {
     for (std::size_t k = 0; k < 16; ++k) {
       const std::size_t x = k % 4, z = k / 4;
       const std::uint64_t row = kRows.mask[k];
-      const auto bits = static_cast<unsigned>(_pext_u64(near, row) | _pext_u64(far, row) << 4);
+      const auto bits = static_cast<unsigned>(gather_bits(near, row) | gather_bits(far, row) << 4);
       if (bits == 0) continue;
       const std::size_t begin = brick_address_[0][x + 4 * (w & 1)] + brick_address_[2][z + (w & 4)];
       if (in_a_row) {
@@ -271,6 +293,7 @@ void LocalGrid::pass_one(std::size_t i) {
 
 /// pass_one() of those of eight cells in a row whose bit is set.
 void LocalGrid::pass_eight(std::size_t first, unsigned bits) {
+#if AREX_VECTOR
   auto* const evidence = reinterpret_cast<__m128i*>(&evidence_[first]);
   auto* const frames = reinterpret_cast<__m128i*>(&frames_[first]);
   const __m128i chosen =
@@ -287,6 +310,11 @@ void LocalGrid::pass_eight(std::size_t first, unsigned bits) {
   if (_mm_testz_si128(refuted, held) == 0) {
     _mm_storel_epi64(frames, _mm_andnot_si128(refuted, held));
   }
+#else
+  for (; bits != 0; bits &= bits - 1) {
+    pass_one(first + static_cast<std::size_t>(std::countr_zero(bits)));
+  }
+#endif
 }
 
 void LocalGrid::hit(const BrickRays& rays, const BrickMask& inside, Held& frame) {
@@ -337,15 +365,11 @@ void LocalGrid::clear() {
 }
 
 std::shared_ptr<GridSnapshot> LocalGrid::free_snapshot() {
-  for (const std::shared_ptr<GridSnapshot>& snapshot : snapshots_) {
-    if (snapshot.use_count() != 1) continue;
-    // The last reader let go of it on its own thread.
-    std::atomic_thread_fence(std::memory_order_acquire);
-    return snapshot;
-  }
-  snapshots_.push_back(std::make_shared<GridSnapshot>());
-  snapshots_.back()->cells.resize(static_cast<std::size_t>(size_.prod()));
-  return snapshots_.back();
+  return snapshots_.take([this] {
+    auto made = std::make_unique<GridSnapshot>();
+    made->cells.resize(static_cast<std::size_t>(size_.prod()));
+    return made;
+  });
 }
 
 void LocalGrid::bar_heights(std::vector<std::uint8_t>& cells) const {

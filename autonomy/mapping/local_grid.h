@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "mapping/buffer_pool.h"
 #include "mapping/grid_view.h"
 #include "mapping/inflation.h"
 #include "mapping/mapping_config.h"
@@ -98,7 +99,7 @@ class LocalGrid {
   BitGrid occupied_;
   BitGrid known_;
   BitGrid inflated_;
-  std::vector<std::shared_ptr<GridSnapshot>> snapshots_;  ///< all that were made
+  BufferPool<GridSnapshot> snapshots_;
 };
 
 }  // namespace arex

@@ -1,7 +1,5 @@
 #include "mapping/mapper.h"
 
-#include <atomic>
-
 #include "mapping/map_files.h"
 
 namespace arex {
@@ -16,13 +14,7 @@ Mapper::Mapper(const LocalGridConfig& local, const GlobalMapConfig& global, doub
       global_(global, resolution_m) {}
 
 std::shared_ptr<RayCaster> Mapper::free_rays() {
-  for (const std::shared_ptr<RayCaster>& rays : rays_) {
-    if (rays.use_count() != 1) continue;
-    // The last reader let go of them on its own thread.
-    std::atomic_thread_fence(std::memory_order_acquire);
-    return rays;
-  }
-  return rays_.emplace_back(std::make_shared<RayCaster>(resolution_m_));
+  return rays_.take([this] { return std::make_unique<RayCaster>(resolution_m_); });
 }
 
 std::shared_ptr<const RayCaster> Mapper::integrate_locally(const RegisteredScan& scan) {

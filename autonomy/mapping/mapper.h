@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "mapping/buffer_pool.h"
 #include "mapping/frame_rays.h"
 #include "mapping/global_map.h"
 #include "mapping/local_grid.h"
@@ -41,7 +42,7 @@ class Mapper {
   VehicleConfig vehicle_;
   double resolution_m_;
   double range_m_;
-  std::vector<std::shared_ptr<RayCaster>> rays_;  ///< all that were made
+  BufferPool<RayCaster> rays_;
   LocalGrid local_;
   GlobalMap global_;
 };

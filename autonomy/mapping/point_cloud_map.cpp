@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "math/mix.h"
+
 namespace arex {
 namespace {
 
@@ -13,22 +15,10 @@ constexpr std::size_t kBatch = 32;  ///< points
 constexpr std::uint32_t kMaxCount = 1000;
 
 std::uint64_t key_of(const Vec3f& p, double voxel_m) {
-  constexpr int kBits = 21;
-  std::uint64_t key = 0;
-  for (int i = 0; i < 3; ++i) {
-    const auto c = static_cast<std::int64_t>(std::floor(static_cast<double>(p[i]) / voxel_m)) +
-                   (std::int64_t{1} << (kBits - 1));
-    key = (key << kBits) | (static_cast<std::uint64_t>(c) & ((std::uint64_t{1} << kBits) - 1));
-  }
-  return key;
-}
-
-std::size_t hash_of(std::uint64_t key) {  // SplitMix64's finaliser
-  key ^= key >> 30;
-  key *= 0xbf58476d1ce4e5b9ULL;
-  key ^= key >> 27;
-  key *= 0x94d049bb133111ebULL;
-  return static_cast<std::size_t>(key ^ (key >> 31));
+  const auto at = [&](int axis) {
+    return static_cast<std::int64_t>(std::floor(static_cast<double>(p[axis]) / voxel_m));
+  };
+  return cell_key(at(0), at(1), at(2));
 }
 
 }  // namespace
@@ -38,7 +28,7 @@ PointCloudMap::PointCloudMap(const PointCloudMapConfig& config)
 
 std::size_t PointCloudMap::slot_of(std::uint64_t key) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t i = hash_of(key) & mask;
+  std::size_t i = mix_bits(key) & mask;
   while (slots_[i] != 0 && voxels_[slots_[i] - 1].key != key) i = (i + 1) & mask;
   return i;
 }
@@ -59,10 +49,10 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
   };
   std::array<Keyed, kBatch> batch;
   std::size_t count = 0;
-  const auto take_in = [&] {
+  const auto insert_batch = [&] {
     const std::size_t mask = slots_.size() - 1;
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t at = slots_[hash_of(batch[i].key) & mask];
+      const std::uint32_t at = slots_[mix_bits(batch[i].key) & mask];
       if (at != 0) __builtin_prefetch(&voxels_[at - 1], 1);
     }
     for (std::size_t i = 0; i < count; ++i) insert(batch[i].key, batch[i].p);
@@ -71,11 +61,11 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
   for (const Vec3f& p : points_O) {
     if (!p.allFinite()) continue;
     const std::uint64_t key = key_of(p, config_.voxel_m);
-    __builtin_prefetch(&slots_[hash_of(key) & (slots_.size() - 1)]);
+    __builtin_prefetch(&slots_[mix_bits(key) & (slots_.size() - 1)]);
     batch[count++] = {key, p};
-    if (count == kBatch) take_in();
+    if (count == kBatch) insert_batch();
   }
-  take_in();
+  insert_batch();
 }
 
 void PointCloudMap::insert(std::uint64_t key, const Vec3f& p) {

@@ -20,8 +20,8 @@ struct PointCloudMapConfig {
   }
 };
 
-/// The global point cloud of a mission: undistorted points in O, one mean per voxel. Memory grows
-/// with what is seen up to a bound, not with time.
+/// The global point cloud of a mission: undistorted points in O (paper, eq. (23)), one mean per
+/// voxel. Memory grows with what is seen up to a bound, not with time.
 class PointCloudMap {
  public:
   explicit PointCloudMap(const PointCloudMapConfig& config);

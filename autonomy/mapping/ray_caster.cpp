@@ -1,12 +1,12 @@
 #include "mapping/ray_caster.h"
 
-#include <immintrin.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
+
+#include "mapping/bits.h"
 
 namespace arex {
 namespace {
@@ -50,9 +50,8 @@ std::uint32_t window_index(const Cell& cell) {
 }
 
 /// Undoes the spread of a brick's coordinate.
-int gather_bits(std::uint32_t spread) {
-  return static_cast<int>(
-      _pext_u32(spread, static_cast<std::uint32_t>(spread_bits(kWindow / 8 - 1))));
+int unspread(std::uint32_t spread) {
+  return static_cast<int>(gather_bits(spread, spread_bits(kWindow / 8 - 1)));
 }
 
 /// One of the two shorter axes during a walk.
@@ -83,6 +82,24 @@ struct Lane {
     next += step;
   }
 };
+
+/// Where the voxels passed are noted.
+struct Marks {
+  std::uint64_t* passed;
+  std::uint8_t* touched;
+
+  void add(std::uint32_t voxel) const {
+    passed[voxel >> 6] |= std::uint64_t{1} << (voxel & 63U);
+    touched[voxel >> 9] = 1;
+  }
+  /// Several voxels of one word.
+  void add(std::uint32_t word, std::uint64_t voxels) const {
+    passed[word >> 6] |= voxels;
+    touched[word >> 9] = static_cast<std::uint8_t>(touched[word >> 9] | (voxels != 0 ? 1 : 0));
+  }
+};
+
+#if AREX_VECTOR
 
 using Four = std::array<std::uint64_t, 4>;
 
@@ -202,22 +219,6 @@ std::uint64_t any_of_four(__m256i v) {
       _mm_cvtsi128_si64(_mm_or_si128(two, _mm_unpackhi_epi64(two, two))));
 }
 
-/// Where the voxels passed are noted.
-struct Marks {
-  std::uint64_t* passed;
-  std::uint8_t* touched;
-
-  void add(std::uint32_t voxel) const {
-    passed[voxel >> 6] |= std::uint64_t{1} << (voxel & 63U);
-    touched[voxel >> 9] = 1;
-  }
-  /// Several voxels of one word.
-  void add(std::uint32_t word, std::uint64_t voxels) const {
-    passed[word >> 6] |= voxels;
-    touched[word >> 9] = static_cast<std::uint8_t>(touched[word >> 9] | (voxels != 0 ? 1 : 0));
-  }
-};
-
 /// Marks the steps that u and v have taken, in the words at `along` of the longest axis.
 /// @param one 1 for the steps that count; `place` along the longest axis
 void mark_four(const FourLanes& u, const FourLanes& v, std::uint32_t along, __m256i place,
@@ -249,6 +250,8 @@ void mark_four(const FourLanes& u, const FourLanes& v, std::uint32_t along, __m2
   marks.add(u_far | v_near, sum[2]);
   marks.add(u_far | v_far, sum[3]);
 }
+
+#endif  // AREX_VECTOR
 
 }  // namespace
 
@@ -327,7 +330,7 @@ void RayCaster::walk(const Vec3& p, const Vec3& d, double length, const Cell& en
   const int step_a = d[a] > 0 ? 1 : -1;
   const Marks marks{passed_.data(), touched_.data()};
   int steps = std::abs(end[a] - at_a);
-  if (steps > 0) {  // the first one begins inside a cell
+  const auto step = [&] {
     const std::uint32_t ia = spread_a[at_a & (kWindow - 1)];
     const std::uint32_t u_in = u.index_in(), u_out = u.index_out();
     const std::uint32_t v_in = v.index_in(), v_out = v.index_out();
@@ -339,7 +342,9 @@ void RayCaster::walk(const Vec3& p, const Vec3& d, double length, const Cell& en
     v.advance();
     at_a += step_a;
     --steps;
-  }
+  };
+  if (steps > 0) step();  // begins inside a cell
+#if AREX_VECTOR
   // Then up to four at a time, those in the four cells along a that words are long.
   FourLanes u4(u, b), v4(v, c);
   const auto size = [](int i) { return static_cast<std::size_t>(i); };
@@ -354,6 +359,9 @@ void RayCaster::walk(const Vec3& p, const Vec3& d, double length, const Cell& en
     at_a += count * step_a;
     steps -= count;
   }
+#else
+  while (steps > 0) step();
+#endif
   // The last step ends inside a cell, which does not count.
   const std::uint32_t ia = spread_a[at_a & (kWindow - 1)];
   const std::uint32_t u_in = u.index_in(), v_in = v.index_in();
@@ -378,7 +386,7 @@ const std::vector<BrickRays>& RayCaster::finish() {
       Cell brick;
       for (int axis = 0; axis < 3; ++axis) {
         const int centre = centre_[axis] >> 3;
-        const int in_window = gather_bits(static_cast<std::uint32_t>(i) >> axis);
+        const int in_window = unspread(static_cast<std::uint32_t>(i) >> axis);
         brick[axis] = centre + ((in_window - centre + 32) & 63) - 32;
       }
       bricks_.push_back({brick, &hit_[8 * i], &passed_[8 * i]});

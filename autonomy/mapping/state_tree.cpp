@@ -1,6 +1,5 @@
 #include "mapping/state_tree.h"
 
-#include <immintrin.h>
 #include <octomap/OcTree.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "files/files.h"
+#include "mapping/bits.h"
 
 namespace arex {
 namespace {
@@ -23,7 +23,7 @@ struct Keyed {
 
 std::uint64_t key_of(const Cell& brick) {
   const auto at = [&](int axis, std::uint64_t mask) {
-    return _pdep_u64(static_cast<std::uint64_t>(brick[axis] + kBrickOffset), mask);
+    return scatter_bits(static_cast<std::uint64_t>(brick[axis] + kBrickOffset), mask);
   };
   return at(0, 0x9249249249249249) | at(1, 0x2492492492492492) | at(2, 0x4924924924924924);
 }

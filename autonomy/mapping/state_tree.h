@@ -9,14 +9,6 @@
 
 namespace arex {
 
-/// A brick in which voxels changed their state (unknown, free, occupied).
-struct BrickChange {
-  Cell brick = Cell::Zero();
-  const BrickMask* known = nullptr;
-  const BrickMask* occupied = nullptr;  ///< within known
-  BrickMask changed{};
-};
-
 /// The map as an octomap::OcTree: its maximum-likelihood form, as OctoMap's binary file stores it
 /// (every known leaf at the upper or the lower clamp), pruned, inner nodes consistent at all times.
 /// Changes come brick by brick in the tree's own order, so that each inner node is refreshed once.

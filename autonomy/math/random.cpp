@@ -3,16 +3,12 @@
 #include <array>
 #include <cmath>
 
+#include "math/mix.h"
+
 namespace arex {
 namespace {
 
 constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
-
-std::uint64_t mix(std::uint64_t z) {
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-  return z ^ (z >> 31);
-}
 
 // FNV-1a, so that a stream's numbers depend on its name and not on the order of construction.
 std::uint64_t hash(std::string_view text) {
@@ -47,13 +43,13 @@ struct Ziggurat {
 }  // namespace
 
 RandomStream::RandomStream(std::uint64_t seed, std::string_view name)
-    : state_(mix(mix(seed + kGolden) ^ hash(name))) {}
+    : state_(mix_bits(mix_bits(seed + kGolden) ^ hash(name))) {}
 
 RandomStream RandomStream::fork(std::uint64_t index) const {
-  return RandomStream(mix(state_ ^ mix((index + 1) * kGolden)));
+  return RandomStream(mix_bits(state_ ^ mix_bits((index + 1) * kGolden)));
 }
 
-std::uint64_t RandomStream::bits() { return mix(state_ += kGolden); }
+std::uint64_t RandomStream::bits() { return mix_bits(state_ += kGolden); }
 
 double RandomStream::uniform() { return to_unit(bits()); }
 

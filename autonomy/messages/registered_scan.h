@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "math/pose.h"
@@ -10,8 +11,10 @@
 /// Measurements placed in O by the odometry: what the maps are made from.
 namespace arex {
 
-/// One LiDAR frame, undistorted, in O. The odometry's points are shared, not copied.
+/// One LiDAR frame, undistorted, in O: what an odometry gives the maps. Its points are shared, not
+/// copied; there are none where they are not to be trusted.
 struct RegisteredScan {
+  Stamp begin = 0;                                     ///< of the frame
   Stamp stamp = 0;                                     ///< end of the frame
   Vec3 origin_begin_O = Vec3::Zero();                  ///< p_OL when the frame began
   Vec3 origin_end_O = Vec3::Zero();                    ///< p_OL at `stamp`
@@ -19,6 +22,9 @@ struct RegisteredScan {
   std::shared_ptr<const std::vector<Vec3f>> points_O;  ///< in firing order, m
   /// When each point was fired, 0 at the frame's begin, 1 at its end; null: evenly spread.
   std::shared_ptr<const std::vector<float>> fractions;
+  /// The pose was found again and may have jumped: what was mapped before lies elsewhere.
+  bool jumped = false;
+  std::optional<double> matched_share;  ///< of its points, where they were matched to a map
 
   [[nodiscard]] std::size_t size() const { return points_O ? points_O->size() : 0; }
   /// The LiDAR's position when point i was fired.

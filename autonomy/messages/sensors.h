@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "math/pose.h"
@@ -45,8 +46,9 @@ struct LidarPoint {
 
 /// One LiDAR frame: everything fired in [stamp, end), in firing order, distorted by the motion.
 struct LidarScan {
-  Stamp stamp = 0;  ///< of the first firing
-  Stamp end = 0;    ///< end of the frame; the last firing lies before it
+  std::string device;  ///< its name where there are several; empty: the first
+  Stamp stamp = 0;     ///< of the first firing
+  Stamp end = 0;       ///< end of the frame; the last firing lies before it
   std::vector<LidarPoint> points;
 };
 
@@ -65,6 +67,7 @@ struct PinholeCamera {
 
 /// One depth frame, rows from the top. Global shutter: all pixels at `stamp`.
 struct DepthImage {
+  std::string device;  ///< its name where there are several; empty: the first
   Stamp stamp = 0;
   PinholeCamera camera;
   std::vector<float> depth_m;  ///< width * height z-depths, m; 0 where there is no measurement

@@ -1,16 +1,41 @@
 #pragma once
 
+#include <map>
 #include <numbers>
+#include <string>
 
 #include "math/pose.h"
 #include "math/types.h"
 
 namespace arex {
 
+/// Where a further sensor sits, as the stack believes.
+struct MountConfig {
+  Vec3 position_m = Vec3::Zero();
+  Vec3 rotation_rad = Vec3::Zero();
+
+  void fields(auto& f) {
+    f("position_m", position_m, "of the sensor's origin in B");
+    f("rotation_rad", rotation_rad,
+      "rotation vector from B's axes to the sensor's: a LiDAR's x forward, y left, z up; a camera "
+      "looks along its x here");
+  }
+  /// A LiDAR's frame in B.
+  [[nodiscard]] Pose X_BL() const { return {so3::Exp(rotation_rad), position_m}; }
+  /// A camera's frame in B: z forward, x right, y down.
+  [[nodiscard]] Pose X_BC() const { return {so3::Exp(rotation_rad) * forward(), position_m}; }
+  /// Looking along x.
+  [[nodiscard]] static Mat3 forward() {
+    Mat3 R;
+    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    return R;
+  }
+};
+
 /// What the stack knows of its vehicle by weighing, measuring and calibrating: the belief, not the
 /// truth (models/arex/arex.xml). A test holds the two together.
 struct VehicleConfig {
-  double mass_kg = 1.9;  ///< paper, III-A
+  double mass_kg = 1.9;  ///< paper, II-A
   Vec3 rotor_offset_m{0.095, 0.1645,
                       0.0};            ///< |x|, |y|, z of each rotor in B (models/arex/README.md)
   double thrust_coefficient = 9.1e-6;  ///< kT, N/(rad/s)^2
@@ -21,10 +46,11 @@ struct VehicleConfig {
   double own_returns_margin_m = 0.105;
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
-  double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, III-A)
+  double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, II-A)
   Vec3 camera_position_m{0.14, 0.0,
-                         0.07};   ///< p_BC, the left imager: above the LiDAR (paper, III-A)
+                         0.07};   ///< p_BC, the left imager: above the LiDAR (paper, II-A)
   double camera_pitch_rad = 0.0;  ///< positive looks down
+  std::map<std::string, MountConfig> mounts;  ///< of further devices, by name
 
   /// Returns nearer to B are the vehicle's own, to the maps.
   [[nodiscard]] double own_returns_m() const { return radius_m + own_returns_margin_m; }
@@ -32,13 +58,18 @@ struct VehicleConfig {
   [[nodiscard]] Pose X_BL() const { return {so3::Exp({0, lidar_pitch_rad, 0}), lidar_position_m}; }
   /// Camera frame in B: z forward, x right, y down.
   [[nodiscard]] Pose X_BC() const {
-    Mat3 R_forward;
-    R_forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    return {so3::Exp({0, camera_pitch_rad, 0}) * R_forward, camera_position_m};
+    return {so3::Exp({0, camera_pitch_rad, 0}) * MountConfig::forward(), camera_position_m};
+  }
+  /// The same of a device by its name; empty: the first. @throws std::out_of_range
+  [[nodiscard]] Pose X_BL(const std::string& device) const {
+    return device.empty() ? X_BL() : mounts.at(device).X_BL();
+  }
+  [[nodiscard]] Pose X_BC(const std::string& device) const {
+    return device.empty() ? X_BC() : mounts.at(device).X_BC();
   }
 
   void fields(auto& f) {
-    f("mass_kg", mass_kg, "all-up mass (paper, III-A)");
+    f("mass_kg", mass_kg, "all-up mass (paper, II-A)");
     f("rotor_offset_m", rotor_offset_m, "|x|, |y|, z of each rotor in B");
     f("thrust_coefficient", thrust_coefficient, "rotor thrust per squared speed, N/(rad/s)^2");
     f("torque_ratio_m", torque_ratio_m, "rotor drag torque per thrust");
@@ -47,9 +78,11 @@ struct VehicleConfig {
       "returns within this of the sphere are the vehicle's own, to the maps");
     f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
     f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
-    f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, III-A)");
+    f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, II-A)");
     f("camera_position_m", camera_position_m, "left imager in B");
     f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
+    f("mounts", mounts,
+      "of further devices, by their names under devices; left out: as the scenario mounts them");
     f.check(mass_kg > 0, "mass_kg > 0");
     f.check(radius_m > 0, "radius_m > 0");
     f.check(own_returns_margin_m >= 0, "own_returns_margin_m >= 0");

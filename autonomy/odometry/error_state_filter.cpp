@@ -115,8 +115,8 @@ PoseInformation::Matrix ErrorStateFilter::pose_covariance() const {
   return pose_rows(pose_columns(P_));
 }
 
-void ErrorStateFilter::doubt_pose(double rotation_std_rad, double position_std_m,
-                                  double velocity_std_mps) {
+void ErrorStateFilter::inflate_pose_covariance(double rotation_std_rad, double position_std_m,
+                                               double velocity_std_mps) {
   P_.topRows<9>().setZero();
   P_.leftCols<9>().setZero();
   P_.diagonal().segment<3>(kRotation).setConstant(rotation_std_rad * rotation_std_rad);

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "odometry/inertial/navigation_state.h"
 #include "odometry/lidar_inertial_config.h"
-#include "odometry/navigation_state.h"
 
 namespace arex {
 
@@ -25,7 +25,7 @@ class ErrorStateFilter {
   [[nodiscard]] const NavigationState& state() const { return x_; }
   [[nodiscard]] const ErrorMatrix& covariance() const { return P_; }
 
-  /// Carries state and covariance over one IMU interval (paper, eq. (2)).
+  /// Propagates state and covariance over one IMU interval (paper, eq. (2)).
   void predict(const ImuInterval& imu);
 
   /// One iteration of an update around `x`, the iterate: where the residuals' information and the
@@ -45,8 +45,10 @@ class ErrorStateFilter {
   /// Covariance of [R_OB, p_OB, R_BL, p_BL].
   [[nodiscard]] PoseInformation::Matrix pose_covariance() const;
 
-  /// Doubts the pose, the velocity and their ties to the rest: for a recovery.
-  void doubt_pose(double rotation_std_rad, double position_std_m, double velocity_std_mps);
+  /// Sets the covariance of pose and velocity anew and drops their correlations with the rest: for
+  /// a recovery.
+  void inflate_pose_covariance(double rotation_std_rad, double position_std_m,
+                               double velocity_std_mps);
 
  private:
   struct Gain;

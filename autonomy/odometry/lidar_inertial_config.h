@@ -1,83 +1,10 @@
 #pragma once
 
-#include "math/types.h"
+#include "odometry/inertial/inertial_config.h"
 
 namespace arex {
 
-/// What the filter believes of the IMU, and how it starts.
-struct ImuNoiseConfig {
-  double delay_s = 0.0025;                  ///< of the readings behind their stamps
-  double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
-  double gyro_scale_noise_density = 5e-3;   ///< share of the rate, 1/sqrt(Hz)
-  double accel_noise_density = 0.03;        ///< m/s^2/sqrt(Hz)
-  double gyro_walk_density = 2e-5;          ///< rad/s^2/sqrt(Hz)
-  double accel_walk_density = 1e-3;         ///< m/s^3/sqrt(Hz)
-  double gyro_range_radps = 34.9;           ///< readings beyond this may be clipped
-  double clipped_gyro_noise_density = 0.3;  ///< of an axis at its limit, rad/s/sqrt(Hz)
-
-  void fields(auto& f) {
-    f("delay_s", delay_s,
-      "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
-      "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added");
-    f("gyro_noise_density", gyro_noise_density,
-      "rad/s/sqrt(Hz): half as much again as the white noise of the sensor (reference.md, 4), for "
-      "aliased vibration; more lets scans of a small scene tilt a vehicle that stands still. A "
-      "start that measures more noise than this raises it and the walk's by the same factor");
-    f("gyro_scale_noise_density", gyro_scale_noise_density,
-      "1/sqrt(Hz), times the rate: errors of scale and alignment");
-    f("accel_noise_density", accel_noise_density,
-      "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and the vibration that its filter aliases");
-    f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz) (reference.md, 4)");
-    f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz) (reference.md, 4)");
-    f("gyro_range_radps", gyro_range_radps,
-      "full scale of the gyro, 2000 deg/s; a lower one is noticed");
-    f("clipped_gyro_noise_density", clipped_gyro_noise_density,
-      "rad/s/sqrt(Hz) while an axis reads its full scale");
-    f.check(delay_s > -0.1 && delay_s < 0.1, "-0.1 < delay_s < 0.1");
-    f.check(gyro_noise_density > 0 && accel_noise_density > 0,
-            "gyro_noise_density > 0, accel_noise_density > 0");
-    f.check(gyro_walk_density >= 0 && accel_walk_density >= 0,
-            "gyro_walk_density >= 0, accel_walk_density >= 0");
-  }
-};
-
-/// Standing still before take-off: gravity, gyro bias, scale of the accelerometer.
-struct StaticInitialiserConfig {
-  double window_s = 1.0;
-  double max_gyro_std_radps = 0.02;
-  double max_accel_std_mps2 = 0.3;
-  double max_gyro_mean_radps = 0.1;
-  double still_rate_radps = 0.005;
-  double still_force_mps2 = 0.1;
-  double still_sigma = 4;
-  double gyro_bias_std_radps = 1e-4;
-  double accel_bias_std_mps2 = 0.05;
-  double gravity_std_mps2 = 0.005;
-
-  void fields(auto& f) {
-    f("window_s", window_s, "standstill that is averaged");
-    f("max_gyro_std_radps", max_gyro_std_radps, "a window that shakes more starts again");
-    f("max_accel_std_mps2", max_accel_std_mps2, "a window that shakes more starts again");
-    f("max_gyro_mean_radps", max_gyro_mean_radps, "a window that turns faster starts again");
-    f("still_rate_radps", still_rate_radps,
-      "after the start, a scan's mean rate below this is still standstill, as far as force allows");
-    f("still_force_mps2", still_force_mps2,
-      "and its mean specific force changed by less than this");
-    f("still_sigma", still_sigma, "beside so many sigma of the white noise in these means");
-    f("gyro_bias_std_radps", gyro_bias_std_radps,
-      "1 sigma of what changes it later, beside the noise of the mean");
-    f("accel_bias_std_mps2", accel_bias_std_mps2,
-      "turn-on bias of the accelerometer, 1 sigma (ICM-42688-P: 20 mg at most)");
-    f("gravity_std_mps2", gravity_std_mps2,
-      "1 sigma of the standard gravity's magnitude: what latitude and height leave open after "
-      "scaling");
-    f.check(window_s >= 0.05 && window_s <= 60, "0.05 <= window_s <= 60");
-    f.check(gyro_bias_std_radps > 0 && accel_bias_std_mps2 > 0 && gravity_std_mps2 > 0,
-            "gyro_bias_std_radps, accel_bias_std_mps2, gravity_std_mps2 > 0");
-  }
-};
-
-/// How the LiDAR errs, as its datasheet and a measured unit say (reference.md, 2).
+/// How the LiDAR errs, as its datasheet and a measured unit say (models/arex/README.md).
 struct LidarNoiseConfig {
   double range_std_m = 0.0034;
   double range_std_per_m = 0.00073;
@@ -95,10 +22,10 @@ struct LidarNoiseConfig {
   }
 
   void fields(auto& f) {
-    f("range_std_m", range_std_m, "range noise at zero range (reference.md, 2)");
-    f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (reference.md, 2)");
-    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (reference.md, 2)");
-    f("blind_m", blind_m, "nearer returns are dropped (reference.md, 5)");
+    f("range_std_m", range_std_m, "range noise at zero range (measured unit)");
+    f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (measured unit)");
+    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (datasheet: below 0.15)");
+    f("blind_m", blind_m, "nearer returns are dropped (FAST-LIO)");
     f("max_range_m", max_range_m, "further returns are dropped");
     f.check(range_std_m > 0 && angle_std_rad > 0, "range_std_m > 0, angle_std_rad > 0");
     f.check(max_range_m > blind_m && blind_m >= 0, "max_range_m > blind_m >= 0");
@@ -147,7 +74,7 @@ struct RegistrationConfig {
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
     f("max_points", max_points, "matched at most");
-    f("max_iterations", max_iterations, "of the iterated update (reference.md, 5)");
+    f("max_iterations", max_iterations, "of the iterated update (FAST-LIO)");
     f("converged_rad", converged_rad, "a smaller step of attitude ends the iterations");
     f("converged_m", converged_m, "a smaller step of position ends the iterations");
     f("gate_sigma", gate_sigma, "residuals beyond this many sigma of their innovation are refused");
@@ -173,8 +100,8 @@ struct OdometryHealthConfig {
   double degenerate_silence_s = 0.35;
   double lost_silence_s = 3.0;
   int lost_scans = 5;
-  double noticed_surprise = 1.2;
-  double doubtful_surprise = 4.0;
+  double noticed_innovation = 1.2;
+  double doubtful_innovation = 4.0;
   int recovery_points = 300;
   int recovery_yaw_steps = 36;
   double recovery_radius_m = 2.0;
@@ -190,15 +117,16 @@ struct OdometryHealthConfig {
       "worst direction of one scan's own information");
     f("degenerate_rotation_std_rad", degenerate_rotation_std_rad,
       "worst direction of one scan's own information");
-    f("lost_position_std_m", lost_position_std_m, "the filter's own doubt at which it is lost");
-    f("lost_rotation_std_rad", lost_rotation_std_rad, "the filter's own doubt at which it is lost");
+    f("lost_position_std_m", lost_position_std_m, "the filter's own deviation at which it is lost");
+    f("lost_rotation_std_rad", lost_rotation_std_rad,
+      "the filter's own deviation at which it is lost");
     f("degenerate_silence_s", degenerate_silence_s, "without a correction: degenerate");
     f("lost_silence_s", lost_silence_s, "without a correction: lost");
     f("lost_scans", lost_scans, "refused scans in a row: lost");
-    f("noticed_surprise", noticed_surprise,
+    f("noticed_innovation", noticed_innovation,
       "a scan that corrects the prediction by this many sigma, RMS over the pose, is degenerate: "
       "the IMU errs (sound: below 0.4; 5 % of gyro scale in a spin: 2.1)");
-    f("doubtful_surprise", doubtful_surprise,
+    f("doubtful_innovation", doubtful_innovation,
       "a scan that corrects the prediction by this many sigma contradicts the IMU: degenerate, and "
       "kept out of the map; lost_scans of them in a row: lost");
     f("recovery_points", recovery_points, "of a scan scored at each guess of a recovery");

@@ -4,16 +4,16 @@
 
 #include "messages/estimates.h"
 #include "messages/vehicle.h"
-#include "odometry/imu_predictor.h"
+#include "odometry/inertial/imu_predictor.h"
 #include "odometry/scan_corrector.h"
 
 namespace arex {
 
 /// Tightly coupled LiDAR-inertial odometry: an iterated error-state Kalman filter, corrected by
-/// scans at 10 Hz, carried on by every IMU sample at 200 Hz.
+/// scans at 10 Hz, propagated by every IMU sample at 200 Hz.
 ///
 /// Frames: O gravity-aligned, origin at start-up; B body = IMU; L LiDAR.
-/// Source: Xu and Zhang, FAST-LIO, RA-L 2021; paper.tex eqs. (2)-(9).
+/// Source: Xu and Zhang, FAST-LIO, RA-L 2021; AREX paper, eqs. (2)-(9).
 ///
 /// A scan is handled in three steps, so that the heavy one may run elsewhere and its result be
 /// applied when the modelled latency is over:

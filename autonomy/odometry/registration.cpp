@@ -1,10 +1,14 @@
 #include "odometry/registration.h"
 
+#include <tsl/robin_set.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
+#include "math/mix.h"
 #include "math/so3.h"
 
 namespace arex {
@@ -60,32 +64,26 @@ void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec
 
 }  // namespace
 
-std::vector<ScanPoint> thin(const std::vector<ScanPoint>& points, double voxel_m, int max_points) {
-  // Open addressing over the cells met; a scan of 20,000 fills a third at most.
-  constexpr std::size_t kSlots = 1U << 16;
-  constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
-  std::vector<std::uint64_t> slots(kSlots, kEmpty);
+std::vector<ScanPoint> voxel_downsample(const std::vector<ScanPoint>& points, double voxel_m,
+                                        int max_points) {
+  constexpr std::size_t kMost = 1U << 15;
+  tsl::robin_set<std::uint64_t, CellKeyHash> seen;
+  seen.reserve(std::min(points.size(), kMost));
   std::vector<ScanPoint> kept;
   const float inverse = static_cast<float>(1 / voxel_m);
   for (const ScanPoint& point : points) {
-    if (kept.size() >= kSlots / 2) break;
-    std::uint64_t key = 0;
-    for (int i = 0; i < 3; ++i) {
-      const auto c = static_cast<std::int64_t>(std::floor(point.p_L[i] * inverse)) + (1 << 20);
-      key = (key << 21) | (static_cast<std::uint64_t>(c) & 0x1fffffU);
-    }
-    std::size_t i = static_cast<std::size_t>((key * 0x9e3779b97f4a7c15ULL) >> 48);
-    while (slots[i] != kEmpty && slots[i] != key) i = (i + 1) & (kSlots - 1);
-    if (slots[i] == key) continue;
-    slots[i] = key;
-    kept.push_back(point);
+    if (kept.size() >= kMost) break;
+    const auto at = [&](int axis) {
+      return static_cast<std::int64_t>(std::floor(point.p_L[axis] * inverse));
+    };
+    if (seen.insert(cell_key(at(0), at(1), at(2))).second) kept.push_back(point);
   }
   const auto limit = static_cast<std::size_t>(max_points);
   if (kept.size() <= limit) return kept;
-  std::vector<ScanPoint> thinned;
-  thinned.reserve(limit);
-  for (std::size_t i = 0; i < limit; ++i) thinned.push_back(kept[i * kept.size() / limit]);
-  return thinned;
+  std::vector<ScanPoint> downsampled;
+  downsampled.reserve(limit);
+  for (std::size_t i = 0; i < limit; ++i) downsampled.push_back(kept[i * kept.size() / limit]);
+  return downsampled;
 }
 
 PlaneResidual plane_residual(const NavigationState& x, const ScanPoint& point,
@@ -141,7 +139,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
   if (report.accepted) {
     const Eigen::Matrix<double, 6, 1> d = local(filter.state(), x).head<6>();
     const Eigen::Matrix<double, 6, 6> P = P_pose.topLeftCorner<6, 6>();
-    report.surprise = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
+    report.innovation = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
     filter.finish(x, at_x.information);
   }
   return report;

@@ -16,7 +16,7 @@ struct RegistrationReport {
   int iterations = 0;
   double residual_rms_sigma = 0;  ///< of the matched, in sigma
   bool accepted = false;          ///< the filter was corrected
-  double surprise = 0;            ///< RMS of the pose's correction, in sigma of the prediction
+  double innovation = 0;          ///< RMS of the pose's correction, in sigma of the prediction
   /// Standard deviation that this scan alone leaves, the worst direction first.
   Vec3 position_std_m = Vec3::Zero();
   Vec3 rotation_std_rad = Vec3::Zero();
@@ -24,9 +24,10 @@ struct RegistrationReport {
   Vec3 worst_rotation_axis_B = Vec3::UnitZ();
 };
 
-/// One point per cell of a grid in L, the first in firing order; thinned evenly to at most
-/// `max_points`.
-std::vector<ScanPoint> thin(const std::vector<ScanPoint>& points, double voxel_m, int max_points);
+/// One point per cell of a grid in L, the first in firing order; of these, evenly spaced ones,
+/// at most `max_points`.
+std::vector<ScanPoint> voxel_downsample(const std::vector<ScanPoint>& points, double voxel_m,
+                                        int max_points);
 
 /// Residual r = n . (p_O - mean), its derivative by [R_OB, p_OB, R_BL, p_BL] and its variance.
 struct PlaneResidual {

@@ -9,12 +9,12 @@
 namespace arex {
 namespace {
 
-constexpr std::size_t kRefined = 6;       // best guesses that are refined
-constexpr int kRefinements = 6;           // updates of each
-constexpr double kScoredDistance = 0.3;   // a point this near its surfel counts, m
-constexpr double kDoubtedVelocity = 2.0;  // m/s
-constexpr double kSamePlace = 0.5;        // m
-constexpr double kSameAttitude = 0.3;     // rad
+constexpr std::size_t kRefined = 6;           // best guesses that are refined
+constexpr int kRefinements = 6;               // updates of each
+constexpr double kScoredDistance = 0.3;       // a point this near its surfel counts, m
+constexpr double kRecoveryVelocityStd = 2.0;  // m/s
+constexpr double kSamePlace = 0.5;            // m
+constexpr double kSameAttitude = 0.3;         // rad
 
 struct Guess {
   Pose X_OB;
@@ -63,7 +63,7 @@ std::vector<Guess> search(const std::vector<ScanPoint>& points, const SurfelMap&
   return guesses;
 }
 
-/// Refines a pose by repeated updates that doubt it less and less. Nothing if it does not fit.
+/// Refines a pose by repeated updates from a covariance that shrinks. Nothing if it does not fit.
 std::optional<Relocalisation> refine(const Pose& X_OB, const std::vector<ScanPoint>& points,
                                      const SurfelMap& map, const LidarInertialConfig& config,
                                      const NavigationState& state, const ErrorMatrix& covariance) {
@@ -76,9 +76,9 @@ std::optional<Relocalisation> refine(const Pose& X_OB, const std::vector<ScanPoi
   filter.reset(x, covariance);
   RegistrationReport report;
   for (int i = 0; i < kRefinements; ++i) {
-    const double doubt = 1.0 / (1 << i);
-    filter.doubt_pose(0.5 * std::numbers::pi * doubt / hc.recovery_yaw_steps,
-                      hc.recovery_step_m * doubt, kDoubtedVelocity);
+    const double scale = 1.0 / (1 << i);
+    filter.inflate_pose_covariance(0.5 * std::numbers::pi * scale / hc.recovery_yaw_steps,
+                                   hc.recovery_step_m * scale, kRecoveryVelocityStd);
     report = register_scan(points, map, config, filter);
     if (!report.accepted) return std::nullopt;
   }

@@ -19,18 +19,6 @@ std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoi
   return fractions;
 }
 
-/// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
-/// of a worse grade, and its bias, which standing for a second cannot tell, wanders in proportion.
-ImuNoiseConfig graded(ImuNoiseConfig imu, const WhiteNoise& measured) {
-  const double gyro = std::max(1.0, measured.gyro / imu.gyro_noise_density);
-  const double accel = std::max(1.0, measured.accel / imu.accel_noise_density);
-  imu.gyro_noise_density *= gyro;
-  imu.gyro_walk_density *= gyro;
-  imu.accel_noise_density *= accel;
-  imu.accel_walk_density *= accel;
-  return imu;
-}
-
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -43,19 +31,19 @@ ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL
       map_(config.map) {}
 
 ScanUpdate ScanCorrector::correct(const ScanJob& job) {
-  imu_.insert(imu_.end(), job.imu.begin(), job.imu.end());
+  imu_.add(job.imu);
   gyro_.full_scale_radps = job.gyro_full_scale_radps;
   ScanUpdate update;
   update.begin = job.scan->stamp;
   update.stamp = job.scan->end;
-  if (stood_at_ && misses_imu(samples_until(update.stamp), update.stamp)) start_again();
+  if (stood_at_ && has_imu_gap(imu_.between(stamp_, update.stamp), update.stamp)) start_again();
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
     update.fractions = std::make_shared<const std::vector<float>>();
   } else {
     const std::vector<ScanPoint> points = register_with_motion(*job.scan, update);
-    judge(update);
+    update_status(update);
     std::vector<Vec3f> points_O;
     std::vector<float> fractions;
     if (update.registration.accepted && status_ != OdometryStatus::kLost &&
@@ -82,28 +70,26 @@ void ScanCorrector::try_start(const LidarScanPtr& scan) {
   standing_scans_.push_back(scan);
   const Stamp window_begin = scan->end - from_seconds(config_.initialiser.window_s);
   std::erase_if(standing_scans_, [&](const LidarScanPtr& s) { return s->stamp < window_begin; });
-  const auto until = std::upper_bound(imu_.begin(), imu_.end(), scan->end,
-                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  const std::span<const ImuSample> samples(imu_.begin(), until);
-  need_ = misses_imu(samples, scan->end) ? OdometryNeed::kImu
-                                         : missing_for_start(samples, config_.initialiser);
+  const std::span<const ImuSample> samples = imu_.until(scan->end);
+  need_ = has_imu_gap(samples, scan->end) ? OdometryNeed::kImu
+                                          : missing_for_start(samples, config_.initialiser);
   const auto standing = start_from_standstill(samples, X_BL_, config_);
   if (need_ == OdometryNeed::kNothing && standing && !start(*standing, scan->end)) {
     need_ = scan->points.empty() ? OdometryNeed::kScan : OdometryNeed::kReference;
   }
   if (need_ != OdometryNeed::kNothing) {
     // One window and what a late scan may lack.
-    forget_imu_before(window_begin - from_seconds(0.2));
+    imu_.forget_before(window_begin - from_seconds(0.2));
     return;
   }
   status_ = OdometryStatus::kOk;
   standing_scans_.clear();
-  forget_imu_before(stamp_);
+  imu_.forget_before(stamp_);
 }
 
 bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   white_noise_ = standing.white_noise;
-  config_.imu = graded(configured_imu_, white_noise_);
+  config_.imu = scaled_to_measured(configured_imu_, white_noise_);
   filter_ = ErrorStateFilter(config_.imu);
   filter_.reset(standing.state, standing.covariance);
   accel_scale_ = standing.accel_scale;
@@ -118,7 +104,8 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   }
   // A filter that no scan can correct runs away within seconds.
   ErrorStateFilter tried = filter_;
-  points = thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+  points =
+      voxel_downsample(points, config_.registration.scan_voxel_m, config_.registration.max_points);
   if (!register_scan(points, map_, config_, tried).accepted) {
     map_ = SurfelMap(config_.map);
     return false;
@@ -127,12 +114,6 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   corrected_position_ = filter_.state().p_OB;
   stood_at_ = filter_.state().X_OB();
   return true;
-}
-
-bool ScanCorrector::misses_imu(std::span<const ImuSample> samples, Stamp until) const {
-  // By as much again the IMU's clock may be off.
-  const Stamp lag = 2 * kMaxImuGap;
-  return samples.empty() || until - samples.back().stamp > lag || has_gap(samples);
 }
 
 void ScanCorrector::start_again() {
@@ -156,15 +137,15 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     if (stood_at_) hold_standstill(scan.end);
     std::vector<ScanPoint> points =
         undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
-    const std::vector<ScanPoint> thinned =
-        thin(points, config_.registration.scan_voxel_m, config_.registration.max_points);
+    const std::vector<ScanPoint> downsampled = voxel_downsample(
+        points, config_.registration.scan_voxel_m, config_.registration.max_points);
     update.gyro_clipped = clipped.any();
     Vec3 missing = Vec3::Zero();
     if (status_ == OdometryStatus::kLost) {
-      update.recovered = recover(thinned, update.registration);
+      update.recovered = recover(downsampled, update.registration);
     } else {
       const NavigationState predicted = filter_.state();
-      update.registration = register_scan(thinned, map_, config_, filter_);
+      update.registration = register_scan(downsampled, map_, config_, filter_);
       missing = missing_rates(gyro_.missing_radps, clipped,
                               local(predicted, filter_.state()).segment<3>(kRotation));
     }
@@ -172,7 +153,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     gyro_.missing_radps = missing;
     if (!clipped.any() || change < kSettled || pass == kPasses) {
       stamp_ = scan.end;
-      forget_imu_before(stamp_);
+      imu_.forget_before(stamp_);
       return points;
     }
     filter_ = before;
@@ -182,7 +163,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
 std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (ImuInterval& imu : imu_intervals(imu_, stamp_, stamp, accel_scale_)) {
+  for (ImuInterval& imu : imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_)) {
     gyro_.complete(imu);
     clipped.add(imu);
     segments.push_back(motion_segment(filter_.state(), imu));
@@ -191,15 +172,10 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
   return segments;
 }
 
-std::span<const ImuSample> ScanCorrector::samples_until(Stamp until) const {
-  const auto after = [](Stamp t, const ImuSample& s) { return t < s.stamp; };
-  const auto begin = std::upper_bound(imu_.begin(), imu_.end(), stamp_, after);
-  return {begin, std::upper_bound(begin, imu_.end(), until, after)};
-}
-
 void ScanCorrector::hold_standstill(Stamp until) {
   const NavigationState& x = filter_.state();
-  if (!stands_still(samples_until(until), x, accel_scale_, config_.initialiser, white_noise_)) {
+  if (!stands_still(imu_.between(stamp_, until), x, accel_scale_, config_.initialiser,
+                    white_noise_)) {
     stood_at_.reset();
     return;
   }
@@ -214,7 +190,7 @@ void ScanCorrector::hold_standstill(Stamp until) {
   filter_.correct<9>(moved, H, variance.asDiagonal());
 }
 
-void ScanCorrector::judge(const ScanUpdate& update) {
+void ScanCorrector::update_status(const ScanUpdate& update) {
   const OdometryHealthConfig& hc = config_.health;
   const RegistrationReport& report = update.registration;
   if (report.accepted) {
@@ -225,7 +201,7 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   } else if (report.points >= hc.min_matches) {  // fewer are silence, which the IMU bridges
     ++refused_in_a_row_;
   }
-  const bool doubtful = report.accepted && report.surprise > hc.doubtful_surprise;
+  const bool doubtful = report.accepted && report.innovation > hc.doubtful_innovation;
   doubtful_in_a_row_ = doubtful ? doubtful_in_a_row_ + 1 : 0;
   const PoseInformation::Matrix P = filter_.pose_covariance();
   const double rotation_std = std::sqrt(P.diagonal().segment<3>(0).maxCoeff());
@@ -235,7 +211,7 @@ void ScanCorrector::judge(const ScanUpdate& update) {
   if (refused_in_a_row_ >= hc.lost_scans || doubtful_in_a_row_ >= hc.lost_scans ||
       position_std > hc.lost_position_std_m || rotation_std > hc.lost_rotation_std_rad) {
     status_ = OdometryStatus::kLost;
-  } else if (!report.accepted || weak || report.surprise > hc.noticed_surprise ||
+  } else if (!report.accepted || weak || report.innovation > hc.noticed_innovation ||
              update.gyro_clipped || confirmations_left_ > 0) {
     status_ = OdometryStatus::kDegenerate;
   } else {
@@ -279,12 +255,6 @@ void ScanCorrector::insert(const std::vector<ScanPoint>& points,
                                            config_.lidar.lateral_variance(range)));
   }
   map_.insert(points_O, variances);
-}
-
-void ScanCorrector::forget_imu_before(Stamp stamp) {
-  const auto after = std::upper_bound(imu_.begin(), imu_.end(), stamp,
-                                      [](Stamp t, const ImuSample& s) { return t < s.stamp; });
-  if (after != imu_.begin()) imu_.erase(imu_.begin(), after - 1);
 }
 
 }  // namespace arex

@@ -2,12 +2,11 @@
 
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "messages/estimates.h"
 #include "messages/sensors.h"
-#include "odometry/gyro_clipping.h"
+#include "odometry/inertial/gyro_clipping.h"
 #include "odometry/registration.h"
 #include "odometry/static_initialiser.h"
 
@@ -60,18 +59,14 @@ class ScanCorrector {
   /// Forgets the map: whatever it came from, the vehicle has not left the ground yet.
   void start_again();
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
-  /// The IMU samples since the last scan.
-  [[nodiscard]] std::span<const ImuSample> samples_until(Stamp until) const;
-  /// Whether they have a gap, or end before `until`.
-  [[nodiscard]] bool misses_imu(std::span<const ImuSample> samples, Stamp until) const;
-  /// Before take-off the vehicle is where it started: ties the filter to that while it stands.
+  /// Before take-off the vehicle is where it started: holds the filter there, by a
+  /// pseudo-measurement, while it stands.
   void hold_standstill(Stamp until);
   std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
-  void judge(const ScanUpdate& update);
+  void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
   [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
-  void forget_imu_before(Stamp stamp);
 
   LidarInertialConfig config_;
   ImuNoiseConfig configured_imu_;  ///< before it is graded by what the start measures
@@ -81,7 +76,7 @@ class ScanCorrector {
   SurfelMap map_;
   double accel_scale_ = 1;
   GyroCompletion gyro_;
-  std::vector<ImuSample> imu_;
+  ImuBuffer imu_;
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start
   WhiteNoise white_noise_;                    ///< of the IMU, measured at the start
   std::optional<Pose> stood_at_;              ///< X_OB, until it moves for the first time

@@ -4,35 +4,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/mix.h"
+
 namespace arex {
 namespace {
 
 constexpr double kUnitVariance = 1e-4;  // weights are told in points of 1 cm noise
 constexpr double kPriorPoints = 3;      // of the points' own noise, in the thickness of a surfel
-constexpr int kCoordinateBits = 21;
-constexpr std::int64_t kCoordinateOffset = std::int64_t{1} << (kCoordinateBits - 1);
 
-/// The cell of p: three 21-bit coordinates side by side.
 std::uint64_t key_of(const Vec3& p, double inverse_edge) {
-  std::uint64_t key = 0;
-  for (int i = 0; i < 3; ++i) {
-    const auto c = static_cast<std::int64_t>(std::floor(p[i] * inverse_edge)) + kCoordinateOffset;
-    key = (key << kCoordinateBits) |
-          (static_cast<std::uint64_t>(c) & ((std::uint64_t{1} << kCoordinateBits) - 1));
-  }
-  return key;
+  const auto at = [&](int axis) {
+    return static_cast<std::int64_t>(std::floor(p[axis] * inverse_edge));
+  };
+  return cell_key(at(0), at(1), at(2));
 }
 
 Vec3 centre_of(const Vec3& p, double edge, double inverse_edge) {
   return ((p * inverse_edge).array().floor() + 0.5).matrix() * edge;
-}
-
-std::size_t hash_of(std::uint64_t key) {  // SplitMix64's finaliser
-  key ^= key >> 30;
-  key *= 0xbf58476d1ce4e5b9ULL;
-  key ^= key >> 27;
-  key *= 0x94d049bb133111ebULL;
-  return static_cast<std::size_t>(key ^ (key >> 31));
 }
 
 Vec3 to_vec3(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
@@ -78,7 +66,7 @@ void SurfelMap::clear() {
 
 std::size_t SurfelMap::slot_of(const Level& level, std::uint64_t key) {
   const std::size_t mask = level.slots.size() - 1;
-  std::size_t i = hash_of(key) & mask;
+  std::size_t i = mix_bits(key) & mask;
   while (level.slots[i].cell != kNone && level.slots[i].key != key) i = (i + 1) & mask;
   return i;
 }
@@ -87,7 +75,7 @@ void SurfelMap::erase_slot(Level& level, std::size_t hole) {
   const std::size_t mask = level.slots.size() - 1;
   // Close the gap: move up whatever may stand at the hole instead of further down.
   for (std::size_t i = (hole + 1) & mask; level.slots[i].cell != kNone; i = (i + 1) & mask) {
-    const std::size_t home = hash_of(level.slots[i].key) & mask;
+    const std::size_t home = mix_bits(level.slots[i].key) & mask;
     if (((i - home) & mask) >= ((i - hole) & mask)) {
       level.slots[hole] = level.slots[i];
       hole = i;
@@ -136,7 +124,7 @@ void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> v
     std::array<std::uint64_t, kAhead> keys{};
     const auto look_ahead = [&](std::size_t i) {
       keys[i % kAhead] = key_of(points_G[i], level.inverse_edge);
-      __builtin_prefetch(&level.slots[hash_of(keys[i % kAhead]) & mask]);
+      __builtin_prefetch(&level.slots[mix_bits(keys[i % kAhead]) & mask]);
     };
     for (std::size_t i = 0; i < std::min(kAhead, points_G.size()); ++i) look_ahead(i);
     for (std::size_t i = 0; i < points_G.size(); ++i) {
@@ -173,7 +161,7 @@ void SurfelMap::prefetch(const Vec3& p_O) const {
   const Vec3 p_G = kR_GO * p_O;
   for (const Level& level : levels_) {
     const std::size_t mask = level.slots.size() - 1;
-    __builtin_prefetch(&level.slots[hash_of(key_of(p_G, level.inverse_edge)) & mask]);
+    __builtin_prefetch(&level.slots[mix_bits(key_of(p_G, level.inverse_edge)) & mask]);
   }
 }
 

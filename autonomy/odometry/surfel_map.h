@@ -14,7 +14,7 @@ struct SurfelMatch {
   Vec3 normal = Vec3::UnitZ();  ///< unit, sign arbitrary
   Vec3 mean = Vec3::Zero();     ///< of the surfel's points, in O, m
   double variance_m2 = 0;  ///< of the surface's height along the normal at the query: thickness
-                           ///< and the fit's own doubt
+                           ///< and the fit's own variance
   int level = 0;           ///< 0: the finest
 };
 
@@ -27,7 +27,7 @@ struct SurfelMatch {
 /// unseen make room (CLOCK).
 ///
 /// Source: the moments are those of the normal-distributions transform (Biber and Strasser, 2003),
-/// the doubt of a fitted plane that of a linear regression, CLOCK is Corbato's, 1968.
+/// the variance of a fitted plane that of a linear regression, CLOCK is Corbato's, 1968.
 class SurfelMap {
  public:
   explicit SurfelMap(const SurfelMapConfig& config);

@@ -2,11 +2,11 @@
 
 #include <vector>
 
+#include "odometry/inertial/navigation_state.h"
 #include "odometry/lidar_inertial_config.h"
-#include "odometry/navigation_state.h"
 
 /// Backward propagation: every point of a scan as it would have been measured at the scan's end.
-/// Source: paper.tex eq. (4).
+/// Source: AREX paper, eq. (4).
 namespace arex {
 
 /// The motion over one IMU interval: constant body rate, constant acceleration in O.

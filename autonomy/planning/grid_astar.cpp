@@ -57,7 +57,7 @@ std::uint32_t flat(const Eigen::Vector3i& cell, const Eigen::Vector3i& size) {
   return static_cast<std::uint32_t>((cell.z() * size.x() + cell.x()) * size.y() + cell.y());
 }
 
-Eigen::Vector3i unflat(std::uint32_t node, const Eigen::Vector3i& size) {
+Eigen::Vector3i cell_of_index(std::uint32_t node, const Eigen::Vector3i& size) {
   const int index = static_cast<int>(node);
   return {index / size.y() % size.x(), index % size.y(), index / (size.y() * size.x())};
 }
@@ -95,7 +95,7 @@ bool GridAstar::pop(std::uint32_t& node) {
 
 void GridAstar::expand(const GridView& grid, const Window& window, std::uint32_t node,
                        const Eigen::Vector3i& goal, const AstarOptions& options) {
-  const Eigen::Vector3i local = unflat(node, window.size), cell = window.low + local;
+  const Eigen::Vector3i local = cell_of_index(node, window.size), cell = window.low + local;
   // One look at the 3 x 3 x 3 block; cells outside the window count as blocked.
   std::uint32_t blocked = 0;
   for (int dz = -1; dz <= 1; ++dz) {
@@ -132,7 +132,7 @@ void GridAstar::expand(const GridView& grid, const Window& window, std::uint32_t
 std::vector<Vec3> GridAstar::trace(const GridView& grid, const Window& window,
                                    std::uint32_t node) const {
   std::vector<Vec3> path;
-  Eigen::Vector3i local = unflat(node, window.size);
+  Eigen::Vector3i local = cell_of_index(node, window.size);
   while (true) {
     path.push_back(grid.centre_of(window.low + local));
     const Node& here = nodes_[flat(local, window.size)];

@@ -5,6 +5,8 @@
 #include <limits>
 #include <queue>
 
+#include "mapping/distance_transform.h"
+
 namespace arex {
 namespace {
 
@@ -100,37 +102,22 @@ class CostMap {
   }
 
  private:
-  /// Distances (cells) to the nearest occupied cell, by a two-pass chamfer transform.
+  /// Distances (cells) to the nearest occupied cell: the same as the explorer's, so that what one
+  /// calls passable is passable for the other.
   void measure_distances() {
-    const auto n = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y());
-    distance_.assign(n, 1e9);
+    std::vector<bool> occupied(static_cast<std::size_t>(size_.x()) *
+                               static_cast<std::size_t>(size_.y()));
     for (int y = 0; y < map_.height; ++y) {
       for (int x = 0; x < map_.width; ++x) {
-        if (map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied) {
-          distance_[index({x, y})] = 0;
-        }
+        occupied[index({x, y})] = map_.cells[map_.index({x, y})] == OccupancyMap2D::kOccupied;
       }
     }
-    // Of a row first what the row before it says, which the compiler turns into vector code, then
-    // what its own cells say one after the other. The outermost columns are blocked anyway.
-    const auto w = static_cast<std::size_t>(size_.x());
-    const auto h = static_cast<std::size_t>(size_.y());
-    const auto take_row = [&](double* row, const double* before) {
-      for (std::size_t x = 1; x + 1 < w; ++x) {
-        const double diagonal = std::min(before[x - 1], before[x + 1]) + M_SQRT2;
-        row[x] = std::min(row[x], std::min(before[x] + 1.0, diagonal));
-      }
-    };
-    for (std::size_t y = 1; y < h; ++y) {
-      double* const row = distance_.data() + y * w;
-      take_row(row, row - w);
-      for (std::size_t x = 1; x < w; ++x) row[x] = std::min(row[x], row[x - 1] + 1.0);
-    }
-    for (std::size_t y = h - 1; y-- > 0;) {
-      double* const row = distance_.data() + y * w;
-      take_row(row, row + w);
-      for (std::size_t x = w - 1; x-- > 0;) row[x] = std::min(row[x], row[x + 1] + 1.0);
-    }
+    const auto squared =
+        squared_distances(size_.x(), size_.y(), [&](std::size_t cell) { return occupied[cell]; });
+    distance_.resize(squared.size());
+    std::transform(squared.begin(), squared.end(), distance_.begin(), [](std::int32_t d2) {
+      return d2 == kNoObstacle ? kInfinity : std::sqrt(static_cast<double>(d2));
+    });
   }
 
   const OccupancyMap2D& map_;
@@ -139,7 +126,7 @@ class CostMap {
 };
 
 /// Straightens where the straight line costs no more than the path between its ends.
-std::vector<Vec2> pull_straight(const CostMap& costs, std::span<const Vec2> path) {
+std::vector<Vec2> shortcut_path(const CostMap& costs, std::span<const Vec2> path) {
   std::vector<Vec2> kept{path.front()};
   std::size_t at = 0;
   while (at + 1 < path.size()) {
@@ -192,7 +179,7 @@ struct Foot {
   Vec3 point = Vec3::Zero();
 };
 
-Foot foot_on(std::span<const Vec3> path, const Vec3& p) {
+Foot project_on(std::span<const Vec3> path, const Vec3& p) {
   Foot best{0, path.front()};
   double best_distance = kInfinity;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
@@ -282,7 +269,7 @@ GuidePath plan_guide(const OccupancyMap2D& map, const Vec2& from, const Vec2& to
   path.front() = from;
   if (found) path.back() = to;
   if (path.size() == 1) path.push_back(found ? to : from);
-  result.points = pull_straight(costs, path);
+  result.points = shortcut_path(costs, path);
   return result;
 }
 
@@ -301,7 +288,7 @@ std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to
 
 double length_ahead(std::span<const Vec3> path, const Vec3& p) {
   if (path.empty()) return 0;
-  const Foot foot = foot_on(path, p);
+  const Foot foot = project_on(path, p);
   double length = (foot.point - p).norm();
   Vec3 at = foot.point;
   for (std::size_t i = foot.piece + 1; i < path.size(); ++i) {
@@ -313,7 +300,7 @@ double length_ahead(std::span<const Vec3> path, const Vec3& p) {
 
 Vec3 point_ahead(std::span<const Vec3> path, const Vec3& p, double ahead_m) {
   if (path.size() < 2) return path.empty() ? p : path.front();
-  const Foot foot = foot_on(path, p);
+  const Foot foot = project_on(path, p);
   Vec3 at = foot.point;
   for (std::size_t i = foot.piece; i + 1 < path.size(); ++i) {
     const double piece = (path[i + 1] - at).norm();

@@ -8,7 +8,7 @@
 
 namespace arex {
 
-/// Budgets of one minimisation (EGO-Planner's published defaults, reference.md section 6).
+/// Budgets of one minimisation (EGO-Planner's published defaults, autonomy/README.md).
 struct LbfgsConfig {
   int memory = 16;
   int max_iterations = 200;

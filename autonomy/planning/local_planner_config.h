@@ -6,8 +6,7 @@
 
 namespace arex {
 
-/// Parameters of the local planner. Defaults from EGO-Planner (reference.md, section 6) unless
-/// noted.
+/// Parameters of the local planner. Defaults from EGO-Planner (autonomy/README.md) unless noted.
 struct LocalPlannerConfig {
   double max_speed_mps = 2.0;
   double max_acceleration_mps2 = 3.0;

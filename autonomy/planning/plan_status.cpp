@@ -21,25 +21,7 @@ std::string_view to_string(PlanStatus status) {
 }
 
 std::string_view to_string(PlanStage stage) {
-  switch (stage) {
-    case PlanStage::kNone:
-      return "none";
-    case PlanStage::kPrevious:
-      return "previous";
-    case PlanStage::kPolynomial:
-      return "polynomial";
-    case PlanStage::kGuided:
-      return "guided";
-    case PlanStage::kRandom:
-      return "random";
-    case PlanStage::kPathFollowing:
-      return "path_following";
-    case PlanStage::kStopAndFollow:
-      return "stop_and_follow";
-    case PlanStage::kEscape:
-      return "escape";
-  }
-  return "unknown";
+  return kPlanStageNames[static_cast<std::size_t>(stage)];
 }
 
 }  // namespace arex

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string_view>
 
 namespace arex {
@@ -25,6 +26,9 @@ enum class PlanStage {
   kStopAndFollow,  ///< brake to rest first, then the same
   kEscape,
 };
+inline constexpr std::array<std::string_view, 8> kPlanStageNames{
+    "none",   "previous",       "polynomial",      "guided",
+    "random", "path_following", "stop_and_follow", "escape"};
 [[nodiscard]] std::string_view to_string(PlanStage stage);
 
 }  // namespace arex

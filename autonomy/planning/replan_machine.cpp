@@ -86,8 +86,13 @@ MotionState ReplanMachine::Flight::state(Stamp now) const {
 }
 
 ReplanMachine::ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner,
-                             const YawConfig& yaw, std::uint64_t seed)
-    : config_(config), planner_(planner), yaw_planner_(yaw), seed_(seed) {}
+                             const YawConfig& yaw, std::uint64_t seed,
+                             std::unique_ptr<LocalPlanner> other)
+    : config_(config),
+      planner_(std::move(other)),
+      bspline_(planner),
+      yaw_planner_(yaw),
+      seed_(seed) {}
 
 void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now) {
   target_ = target;
@@ -101,12 +106,6 @@ void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stam
   recoveries_ = {};
   last_plan_.status = PlanStatus::kOk;  // none has failed on the way to this one
   if (state_ == ReplanState::kExecTraj && !current_.recovery) enter(ReplanState::kReplanTraj, now);
-}
-
-void ReplanMachine::clear_target(Stamp now) {
-  target_.reset();
-  guide_.clear();
-  if (state_ == ReplanState::kGenNewTraj) enter(ReplanState::kWaitTarget, now);
 }
 
 std::vector<PlannerEvent> ReplanMachine::take_events() { return std::exchange(events_, {}); }
@@ -142,7 +141,7 @@ MotionState ReplanMachine::state_at(Stamp stamp, const Odometry& odometry) const
 }
 
 void ReplanMachine::start_at(const Vec3& p_OB, double yaw_rad, Stamp now) {
-  current_ = {hold(p_OB, planner_.config().timing_knot_span_s), now, now};
+  current_ = {hold(p_OB, bspline_.config().timing_knot_span_s), now, now};
   next_.reset();
   track_.clear();  // of another frame, after a jump; flown by somebody else otherwise
   heading_ = {yaw_rad, 0.0};
@@ -283,9 +282,9 @@ void ReplanMachine::exec(const GridView& grid, const Odometry& odometry, Stamp n
 /// count if the trajectory leaves it soon and comes, until then, neither nearer than the true
 /// radius nor nearer than it is by more than a cell: stopping inside would be worse.
 std::optional<double> ReplanMachine::next_collision(const GridView& grid, double t_s) const {
-  const double radius = std::min(planner_.config().vehicle_radius_m,
+  const double radius = std::min(bspline_.config().vehicle_radius_m,
                                  clearance(grid, current_.spline.position(t_s),
-                                           planner_.config().vehicle_radius_m + grid.resolution_m) -
+                                           bspline_.config().vehicle_radius_m + grid.resolution_m) -
                                      grid.resolution_m);
   for (const TimeInterval& stretch : find_collisions(grid, current_.spline, t_s)) {
     bool leaves = stretch.begin_s <= t_s && stretch.end_s < t_s + config_.emergency_time_s;
@@ -298,7 +297,7 @@ std::optional<double> ReplanMachine::next_collision(const GridView& grid, double
 }
 
 bool ReplanMachine::must_replan_for_space(const GridView& grid, Stamp now) const {
-  const LocalPlannerConfig& planner = planner_.config();
+  const LocalPlannerConfig& planner = bspline_.config();
   if (!planner.stop_in_known_space) return false;
   const double speed = current_.state(now).v.norm();
   if (speed <= planner.unknown_speed_mps * (1 + planner.limit_tolerance)) return false;
@@ -330,7 +329,7 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   const bool cautious = is_weak(odometry.status);
   if (cautious) request.max_speed_mps = config_.degenerate_speed_mps;
   request.may_graze = true;
-  request.seed = seed_ + static_cast<std::uint64_t>(plans_ + failures_);
+  request.seed = seed_ + static_cast<std::uint64_t>(counts_.plans + counts_.failures);
   const bool from_rest = request.start.v.norm() < kAtRest_mps;
   if (state_ == ReplanState::kReplanTraj && !from_rest) {
     request.previous = &current_.spline;
@@ -340,18 +339,17 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   for (const double share : kShorter) {
     request.goal = local_target(grid, request.start.p, share * config_.horizon_m);
     final_target = (request.goal - *target_).norm() < 1e-6;
-    last_plan_ = planner_.plan(grid, request);
+    last_plan_ = planner_ ? planner_->plan(grid, request) : bspline_.plan(grid, request);
     const bool shorter_helps = last_plan_.status == PlanStatus::kNoPath ||
                                last_plan_.status == PlanStatus::kGoalInInflation;
     // In flight the next tick is soon enough, and the trajectory in force still good.
     if (last_plan_.ok() || final_target || !shorter_helps || !from_rest) break;
   }
+  counts_.add(last_plan_);
   if (!last_plan_.ok()) {
-    ++failures_;
     report(PlannerEventKind::kPlanFailed, now, cause_of(last_plan_.status));
     return false;
   }
-  ++plans_;
   tries_ = 0;
   Flight flight{last_plan_.trajectory, begin, begin};
   flight.cautious = cautious;
@@ -384,7 +382,7 @@ void ReplanMachine::recover(const GridView& grid, const Odometry& odometry, Stam
 
 bool ReplanMachine::try_escape(const GridView& grid, const MotionState& start, Stamp begin,
                                Stamp now) {
-  PlanResult escape = planner_.plan_escape(grid, start);
+  PlanResult escape = bspline_.plan_escape(grid, start);
   if (!escape.ok()) return false;
   ++recoveries_[0];
   Flight flight{std::move(escape.trajectory), begin, begin};
@@ -407,7 +405,7 @@ bool ReplanMachine::is_trapped(const GridView& grid, const MotionState& start) {
   request.goal = *before;
   request.may_graze = true;
   request.seed = seed_;
-  return !planner_.plan(grid, request).ok();
+  return !bspline_.plan(grid, request).ok();
 }
 
 bool ReplanMachine::try_back_off(const GridView& grid, const MotionState& start, Stamp begin,
@@ -423,7 +421,7 @@ bool ReplanMachine::try_back_off(const GridView& grid, const MotionState& start,
   }
   if (length < config_.track_spacing_m) return false;
   ++recoveries_[1];
-  const LocalPlannerConfig& planner = planner_.config();
+  const LocalPlannerConfig& planner = bspline_.config();
   MotionLimits limits = planner.limits();
   limits.max_speed_mps = config_.back_off_speed_mps;
   Flight flight{time_path(round_corners(path, config_.track_spacing_m), start, limits,
@@ -437,11 +435,11 @@ bool ReplanMachine::try_back_off(const GridView& grid, const MotionState& start,
 }
 
 void ReplanMachine::stop(const GridView& grid, Stamp now, StuckCause cause) {
-  const LocalPlannerConfig& planner = planner_.config();
+  const LocalPlannerConfig& planner = bspline_.config();
   const MotionState start = current_.state(now);
   const Vec3 towards = target_.value_or(start.p);
   const double dt = planner.timing_knot_span_s;
-  auto free = planner_.plan_stop(grid, start, planner.limits(), towards);
+  auto free = bspline_.plan_stop(grid, start, planner.limits(), towards);
   Flight flight{free ? *std::move(free) : widest_stop(grid, start, planner.limits(), dt), now, now};
   flight.recovery = true;
   adopt(std::move(flight));

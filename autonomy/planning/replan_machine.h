@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "mapping/grid_view.h"
 #include "math/progress_watch.h"
 #include "messages/estimates.h"
-#include "planning/local_planner.h"
+#include "planning/bspline_planner.h"
 #include "planning/yaw_planner.h"
 
 namespace arex {
@@ -40,7 +41,7 @@ enum class StuckCause {
 [[nodiscard]] std::string_view to_string(StuckCause cause);
 
 struct ReplanConfig {
-  double check_rate_hz = 20.0;         ///< of tick(): collision check (paper, IV-A)
+  double check_rate_hz = 20.0;         ///< of tick(): collision check (paper, III-A)
   double horizon_m = 7.5;              ///< to the local target (EGO-Planner)
   double replan_after_m = 1.5;         ///< from the start of a trajectory (EGO-Planner)
   double no_replan_within_m = 2.0;     ///< of the goal (EGO-Planner)
@@ -59,7 +60,7 @@ struct ReplanConfig {
   int track_points = 60;
 
   void fields(auto& f) {
-    f("check_rate_hz", check_rate_hz, "collision checks (paper, IV-A)");
+    f("check_rate_hz", check_rate_hz, "collision checks (paper, III-A)");
     f("horizon_m", horizon_m, "to the local target");
     f("replan_after_m", replan_after_m, "distance flown on a trajectory before replanning");
     f("no_replan_within_m", no_replan_within_m, "distance to the goal below which none is needed");
@@ -105,7 +106,7 @@ struct PlannerEvent {
 };
 
 /// Flies to targets by replanning: INIT, WAIT_TARGET, GEN_NEW_TRAJ, REPLAN_TRAJ, EXEC_TRAJ,
-/// EMERGENCY_STOP (reference.md, section 6). Driven by stamps only: tick() at check_rate_hz with
+/// EMERGENCY_STOP (EGO-Planner's states). Driven by stamps only: tick() at check_rate_hz with
 /// the newest grid, setpoint() at the controller's rate. A plan made at a tick takes effect
 /// planning_latency_s later, from the state that the trajectory then in force has at that moment:
 /// position, velocity and acceleration are continuous.
@@ -114,10 +115,12 @@ struct PlannerEvent {
 /// while no plan leads even back there; another target (needs_target() with the cause).
 class ReplanMachine {
  public:
+  /// @param other whose trajectories it flies; null: the B-spline planner's own, which escapes and
+  ///   stops in any case
   ReplanMachine(const ReplanConfig& config, const LocalPlannerConfig& planner, const YawConfig& yaw,
-                std::uint64_t seed);
+                std::uint64_t seed, std::unique_ptr<LocalPlanner> other = nullptr);
 
-  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  /// Takes the vehicle over at rest at the setpoint of another module.
   void start_at(const Vec3& p_OB, double yaw_rad, Stamp now);
 
   /// A new target; `guide` is a polyline in O that leads there (empty: straight).
@@ -127,7 +130,6 @@ class ReplanMachine {
     guide_ = std::move(guide);
     new_guide_ = true;
   }
-  void clear_target(Stamp now);
   /// Gives the target up: another one is needed.
   void give_up(StuckCause cause, Stamp now);
   /// Gives it up where the vehicle gets no nearer to it. tick() asks this, too.
@@ -149,10 +151,7 @@ class ReplanMachine {
   /// The trajectory in force and when it began.
   [[nodiscard]] const UniformBspline& trajectory() const { return current_.spline; }
   [[nodiscard]] Stamp trajectory_start() const { return current_.start; }
-  /// Diagnostics of the newest plan.
-  [[nodiscard]] const PlanResult& last_plan() const { return last_plan_; }
-  [[nodiscard]] int plans() const { return plans_; }
-  [[nodiscard]] int failures() const { return failures_; }
+  [[nodiscard]] const PlanCounts& counts() const { return counts_; }
   /// Events since the last call.
   [[nodiscard]] std::vector<PlannerEvent> take_events();
 
@@ -194,7 +193,8 @@ class ReplanMachine {
   [[nodiscard]] bool must_replan_for_space(const GridView& grid, Stamp now) const;
 
   ReplanConfig config_;
-  LocalPlanner planner_;
+  std::unique_ptr<LocalPlanner> planner_;
+  BsplinePlanner bspline_;
   YawPlanner yaw_planner_;
   std::uint64_t seed_;
 
@@ -218,8 +218,7 @@ class ReplanMachine {
   Heading heading_;
   Stamp last_setpoint_ = 0;
 
-  int plans_ = 0;
-  int failures_ = 0;
+  PlanCounts counts_;
   PlanResult last_plan_;
   std::vector<PlannerEvent> events_;
 };

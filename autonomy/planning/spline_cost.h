@@ -6,26 +6,28 @@
 #include "math/types.h"
 
 /// The cost J = lambda_s J_s + lambda_c J_c + lambda_d J_d of the paper's local planner (eq.
-/// "optimization") over the control points Q of a uniform cubic B-spline, and the fitness term of
+/// (15)) over the control points Q of a uniform cubic B-spline, and the fitness term of
 /// the refinement. Each function returns weight * J and adds weight * dJ/dQ to `gradient`, which
 /// has the size of `q`.
 namespace arex {
 
 /// One {p, v} pair of a control point: p lies on the surface of an obstacle and v (unit) points out
-/// of it; d = (Q - p) . v is the distance to the obstacle (paper, eq. "collision avoidance").
+/// of it; d = (Q - p) . v is the distance to the obstacle (paper, eq. (14)).
 struct Anchor {
   Vec3 p = Vec3::Zero();
   Vec3 v = Vec3::UnitX();
 };
 using Anchors = std::vector<std::vector<Anchor>>;  ///< one list per control point
 
-/// f of the feasibility penalty: zero up to lambda c_m, then cubic, from c_j on quadratic; the
-/// pieces meet in value, slope and curvature.
+/// f of the feasibility penalty (paper, eq. (22)): zero up to lambda c_m, then cubic, from c_j on
+/// quadratic; the pieces meet in value, slope and curvature.
 struct FeasibilityPenalty {
   double threshold;  ///< lambda c_m
   double junction;   ///< c_j
 
-  /// @param tolerance lambda < 1; @param junction_ratio c_j / c_m.
+  /// @param limit c_m
+  /// @param tolerance lambda < 1
+  /// @param junction_ratio c_j / c_m
   FeasibilityPenalty(double limit, double tolerance, double junction_ratio)
       : threshold(tolerance * limit), junction(junction_ratio * limit) {}
   /// f(c), and f'(c) in `slope`.
@@ -46,15 +48,16 @@ struct FitnessReference {
   double across_squared;       ///< b^2, m^2: strict across it
 };
 
-/// J_s = sum |A_i|^2 + sum |J_i|^2.
+/// J_s = sum |A_i|^2 + sum |J_i|^2 (paper, eq. (17)).
 double smoothness_cost(std::span<const Vec3> q, double knot_span_s, double weight,
                        std::span<Vec3> gradient);
 
-/// J_c = sum over control points and their anchors of j_c(s_f - d).
+/// J_c = sum over control points and their anchors of j_c(s_f - d) (paper, eqs. (18)-(19)).
 double collision_cost(std::span<const Vec3> q, const Anchors& anchors, double safe_distance_m,
                       double weight, std::span<Vec3> gradient);
 
-/// J_d = sum w_v F(V_i) + sum w_a F(A_i) + sum w_j F(J_i), F(C) = f(C_x) + f(C_y) + f(C_z).
+/// J_d = sum w_v F(V_i) + sum w_a F(A_i) + sum w_j F(J_i), F(C) = f(C_x) + f(C_y) + f(C_z)
+/// (paper, eqs. (20)-(21)).
 double feasibility_cost(std::span<const Vec3> q, double knot_span_s,
                         const FeasibilityLimits& limits, double weight, std::span<Vec3> gradient);
 

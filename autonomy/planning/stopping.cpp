@@ -120,19 +120,19 @@ std::optional<UniformBspline> find_stop(const GridView& grid, const MotionState&
 
 UniformBspline widest_stop(const GridView& grid, const MotionState& state,
                            const MotionLimits& limits, double dt) {
-  const auto danger = [&](const UniformBspline& stop) {
-    const auto lack = [&](double t) {
+  const auto risk = [&](const UniformBspline& stop) {
+    const auto clearance_deficit = [&](double t) {
       const double missing = kWantedRoom_m - clearance(grid, stop.position(t), kWantedRoom_m);
       return missing * missing;
     };
-    double sum = kHover_s * lack(stop.duration_s());
-    for (double t = 0; t < stop.duration_s(); t += kLook_s) sum += kLook_s * lack(t);
+    double sum = kHover_s * clearance_deficit(stop.duration_s());
+    for (double t = 0; t < stop.duration_s(); t += kLook_s) sum += kLook_s * clearance_deficit(t);
     return sum;
   };
   UniformBspline best = brake(state, limits, dt);
-  double least = danger(best);
+  double least = risk(best);
   for_each_swerve(state, limits, dt, [&](UniformBspline stop) {
-    const double found = danger(stop);
+    const double found = risk(stop);
     if (found >= least) return;
     least = found;
     best = std::move(stop);

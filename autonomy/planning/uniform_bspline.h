@@ -15,8 +15,8 @@ struct MotionState {
   Vec3 a = Vec3::Zero();
 };
 
-/// A uniform cubic B-spline Phi over time: n control points Q_i, one knot span dt (paper, Local
-/// Motion Planner). It lives on [0, (n - 3) dt]; span i is shaped by Q_i .. Q_{i+3} and lies in
+/// A uniform cubic B-spline Phi over time: n control points Q_i, one knot span dt (paper, eq.
+/// (16)). It lives on [0, (n - 3) dt]; span i is shaped by Q_i .. Q_{i+3} and lies in
 /// their convex hull. The control points of its derivatives are
 ///     V_i = (Q_{i+1} - Q_i) / dt,   A_i = (V_{i+1} - V_i) / dt,   J_i = (A_{i+1} - A_i) / dt.
 /// Times outside are clamped to the ends.

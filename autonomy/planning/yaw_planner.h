@@ -29,7 +29,7 @@ struct Heading {
 };
 
 /// Yaw along the path: the tilted LiDAR sees forward from 52 deg below to 7 deg above the horizon
-/// and sideways, but not low behind (reference.md, section 2), so the vehicle looks where it flies.
+/// and sideways, but not low behind (models/arex/README.md), so the vehicle looks where it flies.
 class YawPlanner {
  public:
   explicit YawPlanner(const YawConfig& config) : config_(config) {}

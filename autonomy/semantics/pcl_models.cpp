@@ -28,6 +28,8 @@ const Quiet kQuiet;
 
 }  // namespace
 
+bool has_pcl() { return true; }
+
 std::optional<Vec3> ransac_circle(const std::vector<Vec2>& points, double tolerance,
                                   const Vec2& radii) {
   constexpr std::size_t kFewest = 6;

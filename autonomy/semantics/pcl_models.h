@@ -9,6 +9,11 @@
 /// What PCL does for this room. Its types stay in pcl_models.cpp.
 namespace arex {
 
+/// Whether this build has PCL. Without it the functions below throw std::runtime_error.
+[[nodiscard]] bool has_pcl();
+inline constexpr const char* kNoPcl =
+    "built without PCL, which semantic maps need: install libpcl-dev and build again";
+
 /// The circle (x, y, radius) with most points within `tolerance`, refined on those; nothing if no
 /// circle of a radius in `radii` has at least six. RANSAC with a fixed seed, so the answer is a
 /// function of the points in their order.

@@ -28,7 +28,7 @@ class LegMotion {
  public:
   LegMotion(const TimedPathConfig& path, const CautionConfig& caution);
 
-  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  /// Takes the vehicle over at rest at the setpoint of another module.
   void take_over(const TrajectorySetpoint& from);
   /// After a jump of the pose: what is asked for is flown anew from `from`.
   void start_again(const TrajectorySetpoint& from);

@@ -51,9 +51,7 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   sound_in_a_row_ = missing_ || spikes || refused_in_a_row_ > 0 ? 0 : sound_in_a_row_ + 1;
 }
 
-void LidarWatch::add_registration(const RegistrationReport& report) {
-  if (report.points == 0) return;
-  const double share = static_cast<double>(report.matched) / report.points;
+void LidarWatch::add_matched_share(double share) {
   if (usual_matched_ < 0) usual_matched_ = share;
   const bool refused = share < config_.refused_fraction * usual_matched_;
   refused_in_a_row_ = refused ? refused_in_a_row_ + 1 : 0;

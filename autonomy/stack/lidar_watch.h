@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "messages/sensors.h"
-#include "odometry/registration.h"
 
 namespace arex {
 
@@ -69,8 +68,8 @@ class LidarWatch {
   [[nodiscard]] Survey survey(const LidarScan& scan) const;
 
   void add_scan(Stamp now, const LidarScan& scan);
-  /// What the odometry made of a scan.
-  void add_registration(const RegistrationReport& report);
+  /// What share of a scan's points the odometry matched to its map.
+  void add_matched_share(double share);
   /// @return what changed since the last call, for an event.
   std::optional<std::string_view> update(Stamp now);
 

@@ -3,14 +3,14 @@
 namespace arex {
 
 Navigator::Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs,
-                     std::uint64_t seed)
+                     std::uint64_t seed, std::unique_ptr<LocalPlanner> planner)
     : config_(config),
       force_lag_s_(force_lag_s),
       jobs_(jobs),
       planner_lane_(jobs.add_lane("planner")),
       replan_lane_(jobs.add_lane("replan")),
       guide_lane_(jobs.add_lane("guide")),
-      machine_(config.replan, config.local, config.yaw, seed),
+      machine_(config.replan, config.local, config.yaw, seed, std::move(planner)),
       check_period_(from_seconds(1 / config.replan.check_rate_hz)) {}
 
 void Navigator::take_over(const TrajectorySetpoint& from, Stamp now) {
@@ -67,9 +67,10 @@ TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& 
   if (grid && now >= next_check_) {
     next_check_ = now + check_period_;
     jobs_.run([&] {
-      const int before = machine_.plans() + machine_.failures();
+      const auto asked = [&] { return machine_.counts().plans + machine_.counts().failures; };
+      const int before = asked();
       machine_.tick(grid->view, odometry, now);
-      return machine_.plans() + machine_.failures() == before ? planner_lane_ : replan_lane_;
+      return asked() == before ? planner_lane_ : replan_lane_;
     });
   }
   if (!grid && has_target_) machine_.watch_progress(odometry, now);

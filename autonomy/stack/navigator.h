@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "jobs/job_queue.h"
 #include "mapping/local_grid.h"
 #include "messages/motion.h"
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
-#include "stack/job_queue.h"
 #include "stack/stack_config.h"
 
 namespace arex {
@@ -19,9 +19,11 @@ namespace arex {
 class Navigator {
  public:
   /// @param force_lag_s from the controller's demand to the real force
-  Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs, std::uint64_t seed);
+  /// @param planner of another make; null: the B-spline planner
+  Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs, std::uint64_t seed,
+            std::unique_ptr<LocalPlanner> planner = nullptr);
 
-  /// Takes the vehicle over at rest at a setpoint of somebody else's.
+  /// Takes the vehicle over at rest at the setpoint of another module.
   void take_over(const TrajectorySetpoint& from, Stamp now);
   /// A new goal. @pre the request is a kGoTo.
   void fly_to(const MotionRequest& request, const Odometry& odometry,
@@ -36,7 +38,7 @@ class Navigator {
   [[nodiscard]] const MotionRequest& request() const { return request_; }
   [[nodiscard]] MotionProgress progress() const { return progress_; }
   [[nodiscard]] std::string_view cause() const { return to_string(machine_.cause()); }
-  [[nodiscard]] const ReplanMachine& machine() const { return machine_; }
+  [[nodiscard]] const PlanCounts& counts() const { return machine_.counts(); }
   std::vector<PlannerEvent> take_events() { return std::exchange(events_, {}); }
 
  private:

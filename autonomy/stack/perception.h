@@ -1,15 +1,15 @@
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <utility>
 
+#include "jobs/job_queue.h"
 #include "mapping/flown_trail.h"
 #include "mapping/mapper.h"
 #include "mapping/point_cloud_map.h"
 #include "messages/registered_scan.h"
-#include "odometry/lidar_inertial_odometry.h"
-#include "stack/job_queue.h"
+#include "odometry/pose_history.h"
+#include "odometry/scan_placement.h"
 #include "stack/stack_config.h"
 
 namespace arex {
@@ -24,13 +24,13 @@ class Perception {
   void add_odometry(const Odometry& odometry);
   /// After a jump of the pose: what the local grid holds lies elsewhere, and the poses before say
   /// nothing of the time after.
-  void forget_local(Stamp now);
+  /// @param jumped_at what was measured before that is not mapped any more
+  void forget_local(Stamp now, Stamp jumped_at);
   /// Where the vehicle goes under the planner: the 2D map keeps that way open.
   void note_flown(const Vec3& p_OB) { trail_.add(p_OB); }
-  /// An undistorted frame of the odometry.
-  void add_scan(Stamp now, const ScanUpdate& update);
-  /// A raw frame, placed by the poses kept: for odometry sources that don't undistort.
-  void add_scan(Stamp now, const LidarScanPtr& scan);
+  void add_scan(Stamp now, const RegisteredScan& scan);
+  /// A frame of a further LiDAR: placed by the poses of the odometry that flies.
+  void add_scan(Stamp now, const LidarScan& scan);
   void add_depth(Stamp now, const DepthImagePtr& depth);
 
   /// The newest local grid; null before the first frame.
@@ -56,17 +56,10 @@ class Perception {
   [[nodiscard]] JobQueue::Lane cloud_lane() const { return cloud_lane_; }
 
  private:
-  struct StampedPose {
-    Stamp stamp = 0;
-    Pose X_OB;
-  };
-  [[nodiscard]] Pose pose_at(Stamp stamp) const;
-  void add(Stamp now, const RegisteredScan& scan);
   void add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d, Stamp stamp);
 
   MappingConfig config_;
-  Pose X_BL_;
-  Pose X_BC_;
+  VehicleConfig vehicle_;
   JobQueue& jobs_;
   Mapper mapper_;
   FlownTrail trail_;
@@ -74,9 +67,10 @@ class Perception {
   JobQueue::Lane mapping_lane_;  ///< the mapper's local grid
   JobQueue::Lane global_map_lane_;
   JobQueue::Lane cloud_lane_;
-  std::deque<StampedPose> poses_;
+  PoseHistory poses_;
   bool trusted_ = true;  ///< the odometry was not lost, or it is ok again
-  int jumps_ = 0;        ///< frames of before the last are not handed on
+  int jumps_ = 0;        ///< grids of before the last are not handed on
+  Stamp jumped_at_ = 0;
   Stamp next_map_2d_ = 0;
   std::shared_ptr<const GridSnapshot> grid_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;

@@ -2,38 +2,84 @@
 
 #include <utility>
 
+#include "stack/modules.h"
+
 namespace arex {
 namespace {
 
 // An estimate comes with every sample of a 200 Hz IMU: one that has stopped is none.
 constexpr Stamp kOdometryStale = kNanosecondsPerSecond / 10;
 
+/// What a scenario says under `modules` of a module.
+ConfigNode own_parameters(const StackConfig& config, const std::string& name) {
+  const auto section = config.modules.find(name);
+  if (section != config.modules.end()) return section->second.own;
+  ConfigNode none;
+  none.kind = ConfigNode::Kind::kMap;
+  none.where = name;
+  return none;
+}
+
+template <class Registry>
+auto make(const Registry& registry, const std::string& name, const StackConfig& config,
+          std::uint64_t seed) {
+  return registry.at(name, "stack").make(own_parameters(config, name), {config, seed});
+}
+
+/// Null where the B-spline planner plans, which the navigator has anyway.
+std::unique_ptr<LocalPlanner> other_planner(const StackConfig& config, std::uint64_t seed) {
+  if (config.planning.strategy == PlanningConfig().strategy) return nullptr;
+  return make(modules().planners, config.planning.strategy, config, seed);
+}
+
 }  // namespace
 
 Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
     : config_(with_shared_values(config)),
+      seed_(seed),
       jobs_(jobs),
-      lidar_inertial_(config_.odometry.lidar_inertial, config_.vehicle),
-      odometry_lane_(jobs.add_lane("odometry")),
+      sources_(make_sources()),
       lidar_watch_(config_.odometry.watch),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
-      explorer_(config_.exploration.explorer, config_.mapping.resolution_m, seed),
+      explorer_(make(modules().explorers, config_.exploration.strategy, config_, seed)),
       explorer_lane_(jobs.add_lane("exploration")),
       mission_(config_.mission,
                [this](EventKind kind, const std::string& detail) { report(kind, detail); }),
       landing_finder_(config_.mission.landing, config_.exploration.explorer,
                       config_.vehicle.radius_m),
       legs_(config_.path, config_.caution),
-      navigator_(config_.planning, config_.control.attitude_lag_s, jobs, seed),
+      navigator_(config_.planning, config_.control.attitude_lag_s, jobs, seed,
+                 other_planner(config_, seed)),
       tracker_(config_.control, config_.vehicle),
       control_period_(from_seconds(1 / config_.control.rate_hz)) {}
 
+std::vector<Stack::Source> Stack::make_sources() {
+  const std::string& flying = config_.odometry.source;
+  std::vector<Source> sources;
+  sources.push_back(make_source(flying, "odometry"));
+  for (const auto& [name, section] : config_.odometries) {
+    if (name != flying) sources.push_back(make_source(name, "odometry_" + name));
+  }
+  return sources;
+}
+
+Stack::Source Stack::make_source(const std::string& name, const std::string& lane) {
+  const auto further = config_.odometries.find(name);
+  if (further == config_.odometries.end()) {
+    return {name, make(modules().odometry, name, config_, seed_), jobs_.add_lane(lane),
+            from_seconds(config_.odometry.latency_s)};
+  }
+  const OdometrySection& section = further->second;
+  return {name, modules().odometry.at(section.type, name).make(section.own, {config_, seed_}),
+          jobs_.add_lane(lane),
+          from_seconds(section.latency_s.value_or(config_.odometry.latency_s))};
+}
+
 void Stack::add_imu(const ImuSample& imu) {
-  if (config_.odometry.source == OdometryConfig::Source::kLidarInertial) {
-    set_odometry(lidar_inertial_.add_imu(imu));
-  } else {
-    odometry_.w_OB_B = imu.gyro_radps;
+  for (Source& source : sources_) {
+    source.odometry->add_imu(imu);
+    collect(source);
   }
 }
 
@@ -44,38 +90,51 @@ void Stack::add_battery(const BatterySample& battery) {
 }
 
 void Stack::add_mocap(const MocapSample& mocap) {
-  if (config_.odometry.source != OdometryConfig::Source::kMocap) return;
-  Odometry odometry = odometry_;
-  odometry.stamp = odometry.correction_stamp = mocap.stamp;
-  odometry.X_OB = mocap.X_OB;
-  odometry.v_OB = mocap.v_OB;
-  odometry.status = OdometryStatus::kOk;
-  set_odometry(odometry);
+  for (Source& source : sources_) {
+    source.odometry->add_mocap(mocap);
+    collect(source);
+  }
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
-  lidar_watch_.add_scan(now_, *scan);
-  if (config_.odometry.source != OdometryConfig::Source::kLidarInertial) {
-    perception_.add_scan(now_, scan);
+  if (!scan->device.empty()) {  // for the maps only
+    perception_.add_scan(now_, *scan);
     return;
   }
-  jobs_.start(odometry_lane_, now_, from_seconds(config_.odometry.latency_s),
-              [this, job = lidar_inertial_.prepare(scan)]() -> JobQueue::Delivery {
-                return [this, update = lidar_inertial_.correct(job)] {
-                  lidar_inertial_.apply(update);
-                  lidar_watch_.add_registration(update.registration);
-                  set_odometry(lidar_inertial_.odometry());
-                  if (update.recovered) start_again();
-                  perception_.add_scan(now_, update);
-                };
-              });
+  lidar_watch_.add_scan(now_, *scan);
+  for (Source& source : sources_) {
+    if (auto job = source.odometry->add_scan(scan)) {
+      jobs_.start(source.lane, now_, source.latency,
+                  [this, &source, job = *std::move(job)]() -> JobQueue::Delivery {
+                    return [this, &source, deliver = job()] {
+                      deliver();
+                      collect(source);
+                    };
+                  });
+    }
+    collect(source);
+  }
+}
+
+void Stack::collect(Source& source) {
+  const std::vector<RegisteredScan> scans = source.odometry->take_scans();
+  if (&source != &sources_.front()) return;
+  for (const RegisteredScan& scan : scans) {
+    if (scan.matched_share) lidar_watch_.add_matched_share(*scan.matched_share);
+  }
+  set_odometry(source.odometry->odometry());
+  for (const RegisteredScan& scan : scans) {
+    if (scan.jumped) start_again(scan.stamp);
+    perception_.add_scan(now_, scan);
+  }
 }
 
 void Stack::add_depth(const DepthImagePtr& depth) { perception_.add_depth(now_, depth); }
 
-bool Stack::accepts_depth(Stamp stamp) {
-  if (!config_.mapping.local.use_depth || stamp < next_depth_) return false;
-  next_depth_ += from_seconds(1 / config_.mapping.depth_rate_hz);
+bool Stack::accepts_depth(const std::string& device, Stamp stamp) {
+  Stamp& next = next_depth_[device];
+  if (!config_.mapping.local.use_depth || stamp < next) return false;
+  next += from_seconds(1 / config_.mapping.depth_rate_hz);
   return true;
 }
 
@@ -86,7 +145,7 @@ void Stack::set_odometry(const Odometry& odometry) {
   }
   const bool jumps = jumps_to(odometry);
   odometry_ = odometry;
-  if (jumps) start_again();
+  if (jumps) start_again(odometry.stamp);
   perception_.add_odometry(odometry);
 }
 
@@ -97,25 +156,26 @@ bool Stack::jumps_to(const Odometry& odometry) const {
   return (odometry.X_OB.p - expected).norm() > config_.odometry.jump_m;
 }
 
-void Stack::start_again() {
+void Stack::start_again(Stamp jumped_at) {
   setpoint_ = {};
   setpoint_.p_OB = odometry_.X_OB.p;
   setpoint_.yaw_rad = so3::yaw(odometry_.X_OB.R);
-  perception_.forget_local(now_);
+  perception_.forget_local(now_, jumped_at);
   legs_.start_again(setpoint_);
   navigating_ = false;  // whoever flies next starts from the setpoint
 }
 
-Odometry Stack::believed() const {
+Odometry Stack::checked_odometry() const {
   Odometry odometry = odometry_;
   if (now_ - odometry.stamp > kOdometryStale) odometry.status = OdometryStatus::kLost;
   return odometry;
 }
 
 OdometryNeed Stack::odometry_need() const {
-  if (config_.odometry.source == OdometryConfig::Source::kMocap) return OdometryNeed::kMocap;
-  const bool silent = now_ - odometry_.stamp > kOdometryStale;  // it comes with the IMU's samples
-  return silent ? OdometryNeed::kImu : lidar_inertial_.need();
+  const OdometryNeed need = sources_.front().odometry->need();
+  // An estimate comes with the IMU's samples.
+  const bool silent = now_ - odometry_.stamp > kOdometryStale && need != OdometryNeed::kMocap;
+  return silent ? OdometryNeed::kImu : need;
 }
 
 std::optional<AttitudeCommand> Stack::tick() {
@@ -131,9 +191,10 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ = mission_.update({now_, believed(), odometry_need(), autopilot_.ready, autopilot_.armed,
-                              serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                              navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
+  request_ =
+      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
+                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
+                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
   setpoint_ = move(request_);
   return control(request_);
 }
@@ -148,7 +209,7 @@ void Stack::decide() {
                       progress, energy_,          perception_.flown_since_map()};
   jobs_.start(explorer_lane_, now_, from_seconds(config_.exploration.latency_s),
               [this, input, map = perception_.map_2d()]() -> JobQueue::Delivery {
-                return [this, decision = explorer_.decide(*map, input)] {
+                return [this, decision = explorer_->decide(*map, input)] {
                   mission_.decide(decision);
                   decisions_.push_back(decision);
                 };
@@ -180,6 +241,9 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
   if (request.kind != MotionRequest::Kind::kGoTo) {
     if (navigating_) legs_.take_over(setpoint_);
     navigating_ = false;
+    // The legs into an area lead down ramps and through doors by heights that its 2D map has not.
+    const bool in_area = config_.mission.kind != MissionConfig::Kind::kExplore;
+    if (in_area && !autopilot_.landed) perception_.note_flown(odometry_.X_OB.p);
     if (perception_.grid()) {
       legs_.look_ahead(perception_.grid()->view, config_.vehicle.radius_m);
     }
@@ -234,6 +298,30 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
 
 void Stack::report(EventKind kind, const std::string& detail) {
   events_.push_back({now_, kind, detail});
+}
+
+FlightView Stack::view() const {
+  FlightView view{odometry_,
+                  {},
+                  setpoint_,
+                  mission_.state(),
+                  mission_.lost(),
+                  mission_.stuck(),
+                  mission_.targets(),
+                  mission_.request().goal_O,
+                  perception_.grid(),
+                  perception_.map_2d(),
+                  perception_.known_volume_m3(),
+                  navigator_.counts()};
+  for (std::size_t i = 1; i < sources_.size(); ++i) {
+    view.others.push_back({sources_[i].name, &sources_[i].odometry->odometry()});
+  }
+  return view;
+}
+
+void Stack::read_cloud(Stamp due, CloudReader reader) {
+  jobs_.schedule(perception_.cloud_lane(), due,
+                 [this, reader = std::move(reader)] { return reader(perception_.cloud()); });
 }
 
 std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }

@@ -1,17 +1,17 @@
 #pragma once
 
+#include <map>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "control/tracker.h"
-#include "exploration/explorer.h"
-#include "exploration/mission.h"
-#include "messages/commands.h"
-#include "messages/estimates.h"
-#include "messages/events.h"
-#include "messages/sensors.h"
-#include "odometry/lidar_inertial_odometry.h"
-#include "stack/job_queue.h"
+#include "exploration/landing.h"
+#include "jobs/job_queue.h"
+#include "mission/mission.h"
+#include "odometry/odometry_source.h"
+#include "stack/flight_software.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 #include "stack/navigator.h"
@@ -28,46 +28,49 @@ namespace arex {
 ///                                        |
 ///                                     tracker -> attitude and thrust
 ///
-/// Fed by its caller with what the sensors deliver, in order of time; asked once a millisecond for
-/// a command. Heavy work goes through the job queue.
-class Stack {
+/// The first of its odometry sources flies the vehicle; others run beside, each in a lane of its
+/// own. Heavy work goes through the job queue.
+class Stack : public FlightSoftware {
  public:
   /// @param seed of the planner's and the explorer's random streams
+  /// @pre the modules that `config` names exist (check_modules)
   Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed);
 
-  /// Sets the clock: what is fed or delivered from here on happens at `now`.
-  void begin(Stamp now) { now_ = now; }
-
-  void add_imu(const ImuSample& imu);                 ///< 200 Hz
-  void add_autopilot(const AutopilotStatus& status);  ///< 200 Hz
-  void add_battery(const BatterySample& battery);
-  void add_mocap(const MocapSample& mocap);
-  void add_scan(const LidarScanPtr& scan);  ///< 10 Hz
-  void add_depth(const DepthImagePtr& depth);
-  /// Whether the frame exposed at `stamp` will be read; the driver drops the others. To be asked
-  /// once for each frame.
-  [[nodiscard]] bool accepts_depth(Stamp stamp);
-
-  /// Runs what is due. @return the newest command when there is one, at 100 Hz.
-  std::optional<AttitudeCommand> tick();
-
-  [[nodiscard]] const Odometry& odometry() const { return odometry_; }
-  [[nodiscard]] const TrajectorySetpoint& setpoint() const { return setpoint_; }
-  [[nodiscard]] const Mission& mission() const { return mission_; }
-  [[nodiscard]] const Perception& perception() const { return perception_; }
-  [[nodiscard]] const Navigator& navigator() const { return navigator_; }
-  /// What happened, and what the explorer decided, since the last call.
-  std::vector<Event> take_events();
-  std::vector<Decision> take_decisions();
+  void begin(Stamp now) override { now_ = now; }
+  void add_imu(const ImuSample& imu) override;
+  void add_autopilot(const AutopilotStatus& status) override;
+  void add_battery(const BatterySample& battery) override;
+  void add_mocap(const MocapSample& mocap) override;
+  void add_scan(const LidarScanPtr& scan) override;
+  void add_depth(const DepthImagePtr& depth) override;
+  [[nodiscard]] bool accepts_depth(const std::string& device, Stamp stamp) override;
+  std::optional<AttitudeCommand> tick() override;
+  std::vector<Event> take_events() override;
+  std::vector<Decision> take_decisions() override;
+  [[nodiscard]] FlightView view() const override;
+  void read_cloud(Stamp due, CloudReader reader) override;
+  [[nodiscard]] const PointCloudMap& cloud() const override { return perception_.cloud(); }
+  [[nodiscard]] const Mapper& mapper() const override { return perception_.mapper(); }
 
  private:
+  struct Source {
+    std::string name;
+    std::unique_ptr<OdometrySource> odometry;
+    JobQueue::Lane lane;
+    Stamp latency;
+  };
+
+  std::vector<Source> make_sources();
+  Source make_source(const std::string& name, const std::string& lane);
+  /// Takes what a source has found out since it was last asked.
+  void collect(Source& source);
   void report(EventKind kind, const std::string& detail);
   void set_odometry(const Odometry& odometry);
   [[nodiscard]] bool jumps_to(const Odometry& odometry) const;
   /// The pose has jumped: the map around the vehicle and the way through it begin anew.
-  void start_again();
+  void start_again(Stamp jumped_at);
   /// The estimate as far as it can be believed now.
-  [[nodiscard]] Odometry believed() const;
+  [[nodiscard]] Odometry checked_odometry() const;
   [[nodiscard]] OdometryNeed odometry_need() const;
   void decide();
   void seek_landing();
@@ -76,20 +79,20 @@ class Stack {
   AttitudeCommand control(const MotionRequest& request);
 
   StackConfig config_;
+  std::uint64_t seed_;
   JobQueue& jobs_;
   Stamp now_ = 0;
   std::vector<Event> events_;
   std::vector<Decision> decisions_;
 
-  LidarInertialOdometry lidar_inertial_;
-  JobQueue::Lane odometry_lane_;
+  std::vector<Source> sources_;  ///< the first flies
   LidarWatch lidar_watch_;
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;
 
   Perception perception_;
-  Explorer explorer_;
+  std::unique_ptr<Explorer> explorer_;
   JobQueue::Lane explorer_lane_;
   Stamp next_decision_ = 0;
   Mission mission_;
@@ -103,7 +106,7 @@ class Stack {
   Tracker tracker_;
   Stamp control_period_;
   Stamp next_control_ = 0;
-  Stamp next_depth_ = 0;
+  std::map<std::string, Stamp> next_depth_;  ///< by device
 };
 
 }  // namespace arex

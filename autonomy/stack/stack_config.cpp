@@ -2,12 +2,104 @@
 
 #include <algorithm>
 
+#include "config/nearest.h"
+#include "stack/modules.h"
+
 namespace arex {
 namespace {
 
 constexpr double kMostMapped_m = 400;  // along an axis, as GlobalMapConfig's own rule
 
+/// A section without the keys that are not its module's own.
+ConfigNode without(ConfigNode section, std::initializer_list<std::string_view> keys) {
+  std::erase_if(section.entries, [&](const ConfigNode::Entry& entry) {
+    return std::find(keys.begin(), keys.end(), entry.key) != keys.end();
+  });
+  return section;
+}
+
+/// Where a scenario says something, or else it itself.
+std::string location_of(const ConfigNode& scenario, std::string_view section,
+                        std::string_view key) {
+  const ConfigNode* node = scenario.find(section);
+  if (node) node = node->find(key);
+  return node ? node->where : scenario.where;
+}
+
+/// A section's parameters, if a type of this name is registered anywhere.
+std::optional<std::vector<ParameterInfo>> parameters_of(const std::string& name,
+                                                        const ConfigNode& section) {
+  const Modules& all = arex::modules();
+  if (const auto* type = all.odometry.find(name)) return type->parameters(section);
+  if (const auto* type = all.explorers.find(name)) return type->parameters(section);
+  if (const auto* type = all.planners.find(name)) return type->parameters(section);
+  return std::nullopt;
+}
+
 }  // namespace
+
+void OdometrySection::read(std::string_view name, const ConfigNode& section) {
+  const ConfigNode* named = section.find("type");
+  if (named) config_detail::parse_scalar(*named, "type", type);
+  if (type.empty()) {
+    throw ConfigError(section.where + ": odometry '" + std::string(name) +
+                      "' has no type, expected e.g. type: lidar_inertial");
+  }
+  if (const ConfigNode* latency = section.find("latency_s")) {
+    config_detail::parse_scalar(*latency, "latency_s", latency_s.emplace());
+    if (*latency_s < 0 || *latency_s > 60) {
+      throw ConfigError(latency->where + ": out of range: expected 0 <= latency_s <= 60");
+    }
+  }
+  own = without(section, {"type", "latency_s"});
+  static_cast<void>(
+      arex::modules().odometry.at(type, named ? named->where : section.where).parameters(own));
+}
+
+std::vector<ParameterInfo> OdometrySection::parameters() const {
+  std::vector<ParameterInfo> all{{"type", type, "", "of the source"}};
+  if (latency_s) {
+    all.push_back({"latency_s", config_detail::format_scalar(*latency_s), "s",
+                   "modelled compute time of an update"});
+  }
+  const auto more = arex::modules().odometry.at(type, own.where).parameters(own);
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+void ModuleSection::read(std::string_view given, const ConfigNode& section) {
+  name = given;
+  own = section;
+  if (parameters_of(name, own)) return;
+  std::vector<std::string> known = arex::modules().odometry.names();
+  for (const auto& more : {arex::modules().explorers.names(), arex::modules().planners.names()}) {
+    known.insert(known.end(), more.begin(), more.end());
+  }
+  throw ConfigError(section.where + ": unknown module '" + name + "'; did you mean '" +
+                    nearest(name, known) + "'?");
+}
+
+std::vector<ParameterInfo> ModuleSection::parameters() const { return *parameters_of(name, own); }
+
+void load_plugins(const ConfigNode& scenario) {
+  const ConfigNode* plugins = scenario.find("plugins");
+  if (plugins == nullptr) return;
+  std::vector<std::string> files;
+  config_detail::read_value(*plugins, "plugins", files);
+  for (std::size_t i = 0; i < files.size(); ++i) load_plugin(files[i], plugins->items[i].where);
+}
+
+void check_modules(const StackConfig& config, const ConfigNode& scenario) {
+  const Modules& all = arex::modules();
+  if (!config.odometries.contains(config.odometry.source)) {
+    static_cast<void>(
+        all.odometry.at(config.odometry.source, location_of(scenario, "odometry", "source")));
+  }
+  static_cast<void>(all.explorers.at(config.exploration.strategy,
+                                     location_of(scenario, "exploration", "strategy")));
+  static_cast<void>(
+      all.planners.at(config.planning.strategy, location_of(scenario, "planning", "strategy")));
+}
 
 StackConfig with_shared_values(StackConfig config) {
   const double inflation = config.planning.inflation_m;
@@ -39,6 +131,12 @@ void set_mapped_box(const StackConfig& asked, GlobalMapConfig& box) {
   const Vec2 margin = Vec2::Constant(asked.mapping.global.margin_m);
   box.low_m.head<2>() = area.min() - margin;
   box.high_m.head<2>() = area.max() + margin;
+}
+
+bool StackConfig::uses_odometry(std::string_view type) const {
+  return odometry.source == type ||
+         std::any_of(odometries.begin(), odometries.end(),
+                     [&](const auto& further) { return further.second.type == type; });
 }
 
 std::string StackConfig::broken_region_rule() const {

@@ -3,16 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "config/config.h"
 #include "control/timed_path.h"
 #include "control/tracker.h"
-#include "exploration/explorer.h"
-#include "exploration/mission.h"
+#include "exploration/explorer_config.h"
 #include "mapping/mapping_config.h"
 #include "mapping/point_cloud_map.h"
 #include "messages/vehicle.h"
+#include "mission/mission.h"
 #include "odometry/lidar_inertial_config.h"
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
@@ -21,13 +25,27 @@
 
 namespace arex {
 
-struct OdometryConfig {
-  enum class Source { kLidarInertial, kMocap };
-  friend constexpr std::array<std::string_view, 2> enum_names(Source) {
-    return {"lidar_inertial", "mocap"};
-  }
+/// A further odometry source: its type, and the parameters of that type.
+struct OdometrySection {
+  std::string type;
+  std::optional<double> latency_s;
+  ConfigNode own;  ///< what is the type's own
 
-  Source source = Source::kLidarInertial;
+  void read(std::string_view name, const ConfigNode& section);
+  [[nodiscard]] std::vector<ParameterInfo> parameters() const;
+};
+
+/// The parameters of a module that a plug-in brought, under its name.
+struct ModuleSection {
+  std::string name;
+  ConfigNode own;
+
+  void read(std::string_view name, const ConfigNode& section);
+  [[nodiscard]] std::vector<ParameterInfo> parameters() const;
+};
+
+struct OdometryConfig {
+  std::string source = "lidar_inertial";
   double latency_s = 0.020;  ///< modelled compute time of a scan update
   LidarInertialConfig lidar_inertial;
   LidarWatchConfig watch;
@@ -36,7 +54,9 @@ struct OdometryConfig {
   double jump_m = 0.3;
 
   void fields(auto& f) {
-    f("source", source, "where pose and velocity come from; mocap is the oracle, for ablation");
+    f("source", source,
+      "where pose and velocity come from: a type (lidar_inertial|mocap), or a name under "
+      "odometries; mocap is the oracle, for ablation");
     f("latency_s", latency_s, "modelled compute time of a scan update");
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
     f("jump_m", jump_m, "a step of the pose beyond this makes the local grid and the plan anew");
@@ -52,7 +72,7 @@ struct MappingConfig {
   static constexpr double kOctomapReach = 32767;    ///< its keys have 16 bits an axis
 
   bool enabled = true;
-  double resolution_m = 0.1;  ///< paper, IV-A
+  double resolution_m = 0.1;  ///< paper, III-A
   double latency_s = 0.020;   ///< modelled compute time of one frame
   double depth_rate_hz = 10;
   double map_2d_rate_hz = 2;
@@ -63,7 +83,7 @@ struct MappingConfig {
 
   void fields(auto& f) {
     f("enabled", enabled, "local grid, OctoMap and 2D map: what the planner and the explorer need");
-    f("resolution_m", resolution_m, "of the grids (paper, IV-A)");
+    f("resolution_m", resolution_m, "of the grids (paper, III-A)");
     f("latency_s", latency_s, "modelled compute time of one frame");
     f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
     f("map_2d_rate_hz", map_2d_rate_hz, "how often the 2D map is handed on");
@@ -88,18 +108,19 @@ struct MappingConfig {
 };
 
 struct PlanningConfig {
-  double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, IV-A)
+  double inflation_m = 0.5;      ///< obstacle expansion, each axis (paper, III-A)
   double ceiling_m = 10;         ///< z in O, as a geofence's height is above home
   double floor_m = -20;          ///< z in O
   double guide_rate_hz = 1.0;    ///< a new guide while the map grows
   double guide_latency_s = 0.1;  ///< modelled compute time of a guide
   ReplanConfig replan;
+  std::string strategy = "bspline";
   LocalPlannerConfig local;
   YawConfig yaw;
   GuideConfig guide;
 
   void fields(auto& f) {
-    f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, IV-A)");
+    f("inflation_m", inflation_m, "obstacle expansion, each axis (paper, III-A)");
     f("ceiling_m", ceiling_m,
       "highest z in O (above where the vehicle stood) of goals and planned ways, whatever the "
       "ground below does");
@@ -107,6 +128,7 @@ struct PlanningConfig {
     f("guide_rate_hz", guide_rate_hz, "how often the guide follows the growing map");
     f("guide_latency_s", guide_latency_s, "modelled compute time of a guide");
     f("replan", replan, "replanning state machine");
+    f("strategy", strategy, "who makes trajectories within the local grid (bspline, or a plug-in)");
     f("local", local, "B-spline planner");
     f("yaw", yaw, "heading along the path");
     f("guide", guide, "global guide path");
@@ -118,11 +140,13 @@ struct PlanningConfig {
 };
 
 struct ExplorationConfig {
+  std::string strategy = "revenue";
   double decision_rate_hz = 1.0;
   double latency_s = 0.05;  ///< modelled compute time of a decision
   ExplorerConfig explorer;  ///< its keys stand directly under `exploration`
 
   void fields(auto& f) {
+    f("strategy", strategy, "who chooses the next goal (revenue|nearest, or a plug-in)");
     f("decision_rate_hz", decision_rate_hz, "how often the explorer looks at its target");
     f("latency_s", latency_s, "modelled compute time of a decision");
     explorer.fields(f);
@@ -135,6 +159,7 @@ struct ExplorationConfig {
 struct StackConfig {
   VehicleConfig vehicle;
   OdometryConfig odometry;
+  std::map<std::string, OdometrySection> odometries;
   MappingConfig mapping;
   PlanningConfig planning;
   ExplorationConfig exploration;
@@ -142,12 +167,17 @@ struct StackConfig {
   TimedPathConfig path;
   CautionConfig caution;
   TrackerConfig control;
+  std::vector<std::string> plugins;
+  std::map<std::string, ModuleSection> modules;
 
   void fields(auto& f) {
     f("vehicle", vehicle,
       "what the stack believes of its vehicle, by weighing and calibrating; the truth is "
       "models/arex/arex.xml and physics");
     f("odometry", odometry, "pose and velocity");
+    f("odometries", odometries,
+      "further sources that run beside, by name: {type: lidar_inertial, ...}; what they leave out "
+      "is as under odometry");
     f("mapping", mapping, "maps of the surroundings");
     f("planning", planning, "from a goal to a trajectory");
     f("exploration", exploration, "from the 2D map to the next goal");
@@ -155,6 +185,8 @@ struct StackConfig {
     f("path", path, "timed paths along straight legs");
     f("caution", caution, "answers to a weak odometry");
     f("control", control, "trajectory tracking");
+    f("plugins", plugins, "shared libraries with modules of yours (autonomy/stack/modules.h)");
+    f("modules", modules, "parameters of these modules, by their names");
     const bool plans = mission.kind == MissionConfig::Kind::kGoals ||
                        mission.kind == MissionConfig::Kind::kExplore;
     // Goals beyond these become stuck, typed, in flight; straight legs are their author's word.
@@ -166,9 +198,14 @@ struct StackConfig {
                 (height <= planning.ceiling_m && height >= planning.floor_m),
             "exploration.flight_height_m between planning.floor_m and planning.ceiling_m");
     f.check(mapping.enabled || !plans, "mapping.enabled true for missions that plan");
+    f.check(!odometries.contains("truth") && !odometries.contains("estimate"),
+            "odometries with other names than truth and estimate, which files of a run have");
     f.check(!exploration.explorer.follow_ground || mapping.global.band == BandReference::kGround,
             "exploration.follow_ground only with mapping.global.band: ground");
   }
+
+  /// Whether a source of this type flies or runs beside.
+  [[nodiscard]] bool uses_odometry(std::string_view type) const;
 
   /// Where exploring begins, in O: after the entry legs.
   [[nodiscard]] Vec3 explored_from() const {
@@ -179,6 +216,13 @@ struct StackConfig {
   /// checks of fields(), for the box may be worked out only after reading (set_mapped_box).
   [[nodiscard]] std::string broken_region_rule() const;
 };
+
+/// Loads the plug-ins that a scenario names, before its sections are read. @throws ConfigError.
+void load_plugins(const ConfigNode& scenario);
+
+/// That every module which `config` chooses by name exists. @throws ConfigError where `scenario`
+/// names one that does not.
+void check_modules(const StackConfig& config, const ConfigNode& scenario);
 
 /// Hands what one section says to the modules below others that need it too: a number has one home,
 /// and whoever changes it there has changed it for all.

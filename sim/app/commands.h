@@ -86,6 +86,20 @@ struct ReportArguments {
 };
 int report(const ReportArguments& arguments);
 
+struct EvaluateArguments {
+  std::vector<std::string> files;  ///< estimates and, without `truth`, the reference behind them
+  std::string truth;               ///< a trajectory or a run folder; empty: the last of the files
+  std::string align = "none";
+  std::uint64_t poses_to_align = 0;  ///< the first so many matched ones; 0: all
+  double max_time_difference_s = 0.01;
+  double time_offset_s = 0;
+  std::vector<std::string> deltas_m;  ///< empty: 1 and 10
+  bool pairs_from_reference = false;
+  std::string format;  ///< of files that cannot be told apart; empty: none is
+  std::string out;     ///< folder of evaluation.json and .html; empty: neither
+};
+int evaluate(const EvaluateArguments& arguments);
+
 int params(const ScenarioArguments& arguments);
 int validate(const ScenarioArguments& arguments);
 

@@ -18,6 +18,17 @@ int cores() {
   return sched_getaffinity(0, sizeof set, &set) == 0 ? std::max(1, CPU_COUNT(&set)) : 1;
 }
 
+std::filesystem::path resolve_input_file(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  if (file.empty() || file.is_absolute() || fs::exists(file, none)) return file;
+  const fs::path share = fs::read_symlink("/proc/self/exe", none).parent_path() / "../share/arex";
+  for (const fs::path& candidate : {share / file, share / "scenarios" / file}) {
+    if (fs::is_regular_file(candidate, none)) return fs::weakly_canonical(candidate, none);
+  }
+  return file;
+}
+
 void open_standard_streams() {
   for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream) {
     // The lowest free number is the one that is closed.

@@ -54,7 +54,10 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
 
 void add_world(CLI::App& app, WorldArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("world", "write a world: mesh, MJCF, ground-truth map");
-  command->add_option("recipe", arguments.file, "world recipe, or a scenario")->required();
+  command
+      ->add_option("recipe", arguments.file,
+                   "world recipe, scenario, or a mesh, Gazebo world, octree or cloud")
+      ->required();
   command->add_option("--set", arguments.overrides, "key=value over what the file says")
       ->allow_extra_args(false);
   add_number(*command, "--seed", arguments.seed, kSeeds, "the seed of the world");
@@ -131,6 +134,37 @@ void add_report(CLI::App& app, ReportArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = report(arguments); });
 }
 
+void add_evaluate(CLI::App& app, EvaluateArguments& arguments, int& exit_code) {
+  auto* command =
+      app.add_subcommand("evaluate", "compare trajectories with the truth, as evo does");
+  command
+      ->add_option("files", arguments.files,
+                   "estimates and behind them the truth: TUM, EuRoC or KITTI, or a run folder")
+      ->required();
+  command->add_option("--truth", arguments.truth, "the truth, if all of the files are estimates");
+  command
+      ->add_option("--align", arguments.align,
+                   "what moves an estimate onto the truth: none, origin, yaw, se3, sim3 or scale")
+      ->check(CLI::IsMember({"none", "origin", "yaw", "se3", "sim3", "scale"}))
+      ->capture_default_str();
+  add_number(*command, "--n-to-align", arguments.poses_to_align, Range<std::uint64_t>{},
+             "align by the first so many matched poses; 0: by all");
+  add_number(*command, "--max-time-difference", arguments.max_time_difference_s,
+             Range<double>{0, 1e9}, "between poses that belong together, s");
+  add_number(*command, "--time-offset", arguments.time_offset_s, Range<double>{-1e12, 1e12},
+             "added to the stamps of the estimates, s");
+  command->add_option("--delta", arguments.deltas_m, "lengths of the relative error's sub-paths, m")
+      ->default_str("1,10")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_flag("--pairs-from-reference", arguments.pairs_from_reference,
+                    "measure sub-paths along the truth, not along the estimate");
+  command->add_option("--format", arguments.format, "what files are that may be of several formats")
+      ->check(CLI::IsMember({"tum", "euroc", "kitti"}));
+  command->add_option("--out", arguments.out, "folder for evaluation.json and evaluation.html");
+  command->callback([&] { exit_code = evaluate(arguments); });
+}
+
 void add_semantics(CLI::App& app, SemanticsArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("semantics", "name what a point cloud shows");
   command->add_option("cloud", arguments.input, "CLOUD.pcd, CLOUD.ply or a run folder")->required();
@@ -197,6 +231,7 @@ int execute(int argc, char** argv) {
   SweepArguments sweep_arguments;
   SweepTaskArguments sweep_task_arguments;
   ReportArguments report_arguments;
+  EvaluateArguments evaluate_arguments;
   SemanticsArguments semantics_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
@@ -208,6 +243,7 @@ int execute(int argc, char** argv) {
   add_sweep(app, sweep_arguments, exit_code);
   add_sweep_task(app, sweep_task_arguments, exit_code);
   add_report(app, report_arguments, exit_code);
+  add_evaluate(app, evaluate_arguments, exit_code);
   add_semantics(app, semantics_arguments, exit_code);
   add_help(app, help_topic, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");

@@ -2,13 +2,15 @@
 #include <cstdio>
 
 #include "app/commands.h"
+#include "app/host.h"
 #include "run/scenario.h"
 
 namespace arex::app {
 namespace {
 
 sim::Scenario load(const ScenarioArguments& arguments) {
-  return sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+  return sim::load_scenario(resolve_input_file(arguments.file), arguments.overrides,
+                            arguments.seed);
 }
 
 }  // namespace
@@ -25,7 +27,11 @@ int params(const ScenarioArguments& arguments) {
 }
 
 int validate(const ScenarioArguments& arguments) {
-  const sim::Scenario scenario = load(arguments);
+  sim::Scenario scenario = load(arguments);
+  if (scenario.config.world.kind == worlds::WorldKind::kFile) {
+    scenario.file_world = scenario.read_file_world();
+    std::fputs(worlds::describe(*scenario.file_world).c_str(), stdout);
+  }
   const worlds::World world = scenario.build_world();
   std::printf("%s: valid; %zu objects, %zu triangles\n", arguments.file.c_str(),
               world.objects.size(), world.mesh.triangles.size());

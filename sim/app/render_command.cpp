@@ -1,17 +1,17 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 #include <utility>
 
 #include "app/commands.h"
-#include "app/film_writer.h"
-#include "app/flight_pictures.h"
 #include "config/config.h"
 #include "files/files.h"
+#include "pictures/film_writer.h"
+#include "pictures/flight_pictures.h"
 #include "report/run_record.h"
 #include "run/file_io.h"
 #include "run/scenario.h"
@@ -19,7 +19,7 @@
 namespace arex::app {
 namespace {
 
-using View = FlightPictures::View;
+using View = sim::FlightPictures::View;
 
 // Even, as video codecs want them; larger stills are for print.
 constexpr int kFilmWidth = 960;
@@ -30,66 +30,61 @@ View view_named(const std::string& name) {
   return name == "both" ? View::kBoth : name == "top" ? View::kTop : View::kChase;
 }
 
-std::string format(const char* text, double a, double b, double c) {
-  std::array<char, 128> out{};
-  std::snprintf(out.data(), out.size(), text, a, b, c);
-  return out.data();
-}
-
 // Beginning and end, s; what reaches beyond the flight is cut.
 std::pair<double, double> span_of_film(const RenderArguments& arguments,
-                                       const std::vector<sim::StampedPose>& truth) {
+                                       const std::vector<sim::TimedPose>& truth) {
   const double first = truth.front().time_s;
   const double last = truth.back().time_s;
   const double begin = arguments.from_s.value_or(first);
   const double end = arguments.to_s.value_or(last);
   if (!(begin < last)) {
-    throw ConfigError(
-        format("--from %g: lies behind the end of the flight, expected %.2f to less than %.2f s",
-               begin, first, last));
+    throw ConfigError(fmt::format(
+        "--from {:g}: lies behind the end of the flight, expected {:.2f} to less than {:.2f} s",
+        begin, first, last));
   }
   if (!(end > first)) {
-    throw ConfigError(
-        format("--to %g: lies before the start of the flight, expected more than %.2f to %.2f s",
-               end, first, last));
+    throw ConfigError(fmt::format(
+        "--to {:g}: lies before the start of the flight, expected more than {:.2f} to {:.2f} s",
+        end, first, last));
   }
   if (!(begin < end)) {
-    throw ConfigError(format("--from %g: lies behind --to %g, expected it before", begin, end, 0));
+    throw ConfigError(
+        fmt::format("--from {:g}: lies behind --to {:g}, expected it before", begin, end));
   }
   return {std::max(begin, first), std::min(end, last)};
 }
 
 void draw_still(const RenderArguments& arguments, const worlds::World& world, const Pose& X_WO,
-                const std::vector<sim::StampedPose>& truth) {
+                const std::vector<sim::TimedPose>& truth) {
   const double begin = truth.front().time_s;
   const double end = truth.back().time_s;
   const double time = arguments.time_s.value_or(end / 2);
   if (!(time >= begin && time <= end)) {
-    throw ConfigError(
-        format("--time %g: lies outside of the flight, expected %.2f to %.2f s", time, begin, end));
+    throw ConfigError(fmt::format(
+        "--time {:g}: lies outside of the flight, expected {:.2f} to {:.2f} s", time, begin, end));
   }
   const View view = view_named(arguments.view.empty() ? "chase" : arguments.view);
-  FlightPictures pictures(world, X_WO, truth, view, {});
+  sim::FlightPictures pictures(world, X_WO, truth, view, {});
   sim::save_png(pictures.at(time, end), arguments.out);
   std::printf("%s: %.2f s of %.2f s\n", arguments.out.c_str(), time, end);
 }
 
 void draw_film(const RenderArguments& arguments, const worlds::World& world, const Pose& X_WO,
-               const std::vector<sim::StampedPose>& truth) {
+               const std::vector<sim::TimedPose>& truth) {
   const auto [begin, end] = span_of_film(arguments, truth);
   sim::PictureOptions options;
   options.width = kFilmWidth;
   options.height = kFilmHeight;
   const std::filesystem::path file = check_writable(arguments.out);
-  const std::filesystem::path ffmpeg = find_program("ffmpeg");
+  const std::filesystem::path ffmpeg = sim::find_program("ffmpeg");
   const std::filesystem::path frames = file.parent_path() / (file.stem().string() + "_frames");
   std::optional<sim::OutputFolder> folder;
   if (ffmpeg.empty()) folder.emplace(frames);
   const View view = view_named(arguments.view.empty() ? "both" : arguments.view);
-  FlightPictures pictures(world, X_WO, truth, view, options);
-  const auto film =
-      ffmpeg.empty() ? film_as_frames(frames)
-                     : film_by_ffmpeg(ffmpeg, file, options.width, options.height, arguments.fps);
+  sim::FlightPictures pictures(world, X_WO, truth, view, options);
+  const auto film = ffmpeg.empty() ? sim::film_as_frames(frames)
+                                   : sim::film_by_ffmpeg(ffmpeg, file, options.width,
+                                                         options.height, arguments.fps);
   const double step = arguments.speed / arguments.fps;
   const double steps = std::floor((end - begin) / step);
   if (!(steps < kMostFrames)) {
@@ -127,7 +122,7 @@ int render(const RenderArguments& arguments) {
                       (std::filesystem::exists(folder) ? ": holds no run" : ": does not exist") +
                       ", expected a run folder");
   }
-  const std::vector<sim::StampedPose> truth = sim::read_tum(folder / "truth.tum");
+  const std::vector<sim::TimedPose> truth = sim::read_tum(folder / "truth.tum");
   if (truth.size() < 2) {
     throw ConfigError((folder / "truth.tum").string() +
                       ": holds no flight, expected two poses and more");

@@ -54,11 +54,11 @@ class ProgressLine {
     if (wall < next_) return;
     next_ = wall + (on_terminal_ ? 0.25 : 10.0);  // a log wants a line now and then
     const double time = to_seconds(simulation.now());
-    const Mission& mission = simulation.stack().mission();
-    const auto state = kMissionStateNames[static_cast<std::size_t>(mission.state())];
+    const FlightView view = simulation.view();
+    const auto state = kMissionStateNames[static_cast<std::size_t>(view.state)];
     if (on_terminal_) std::fputc('\r', stderr);
     std::fprintf(stderr, "%7.1f s  %-10.*s  targets %2zu  explored %3.0f %%  %5.2fx real time ",
-                 time, static_cast<int>(state.size()), state.data(), mission.targets().size(),
+                 time, static_cast<int>(state.size()), state.data(), view.targets.size(),
                  100 * simulation.area_fraction(), time / wall);
     if (!on_terminal_) std::fputc('\n', stderr);
     drawn_ = true;
@@ -185,8 +185,8 @@ std::vector<sim::Requirement> parse_requirements(const RunArguments& arguments) 
 }
 
 /// @return whether every requirement is met; one line for each that is not.
-bool judge(const std::vector<sim::Requirement>& requirements,
-           const nlohmann::ordered_json& summary) {
+bool all_met(const std::vector<sim::Requirement>& requirements,
+             const nlohmann::ordered_json& summary) {
   bool all = true;
   for (const sim::Requirement& requirement : requirements) {
     const std::string violation = sim::violation(requirement, summary);
@@ -219,8 +219,9 @@ int run(const RunArguments& arguments) {
   const double cpu_begin = cpu_seconds();
   const Interrupts interrupts;
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the progress may leave: the flight goes on
-  sim::Scenario scenario = sim::load_scenario(arguments.scenario.file, arguments.scenario.overrides,
-                                              arguments.scenario.seed);
+  sim::Scenario scenario =
+      sim::load_scenario(resolve_input_file(arguments.scenario.file), arguments.scenario.overrides,
+                         arguments.scenario.seed);
   scenario.name = printable(arguments.name.empty() ? scenario.name : arguments.name);
   const std::vector<sim::Requirement> requirements = parse_requirements(arguments);
   const std::unique_ptr<sim::RunFolder> folder = claim_folder(arguments, scenario);
@@ -250,7 +251,7 @@ int run(const RunArguments& arguments) {
         [&] { print_result(result, report ? folder->path() / "report.html" : folder->path()); });
   }
   complain(result, outputs.failures(), arguments.quiet);
-  const bool met = judge(requirements, summary);
+  const bool met = all_met(requirements, summary);
   if (Interrupts::signal() != 0) return 128 + SIGINT;
   return met && outputs.failures().empty() && result.outcome == sim::Outcome::kSucceeded ? 0 : 1;
 }

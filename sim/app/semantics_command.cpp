@@ -11,6 +11,7 @@
 #include "run/file_io.h"
 #include "run/run_folder.h"
 #include "semantics/cloud_file.h"
+#include "semantics/pcl_models.h"
 #include "semantics/semantic_picture.h"
 
 namespace arex::app {
@@ -44,7 +45,7 @@ Input input_of(const fs::path& given) {
   }
   constexpr double kStep = 0.25;  // m, between points of the path
   Input input{given / "cloud.pcd", {}};
-  for (const sim::StampedPose& pose : sim::read_tum(given / "estimate.tum")) {
+  for (const sim::TimedPose& pose : sim::read_tum(given / "estimate.tum")) {
     if (input.path.empty() || (pose.X_OB.p - input.path.back()).norm() > kStep) {
       input.path.push_back(pose.X_OB.p);
     }
@@ -67,6 +68,7 @@ void print_result(const SemanticMap& map, const CloudFile& cloud, const fs::path
 }  // namespace
 
 int semantics(const SemanticsArguments& arguments) {
+  if (!has_pcl()) throw ConfigError(kNoPcl);
   const SemanticConfig config = config_of(arguments.overrides);
   const Input input = input_of(arguments.input);
   const CloudFile cloud = read_cloud_file(input.cloud);

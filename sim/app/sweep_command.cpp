@@ -1,10 +1,15 @@
+#include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
+#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -33,11 +38,48 @@ constexpr double kPatience_s = 2;
 constexpr double kTaskPatience_s = 60;
 
 std::string clock_text(double seconds) {
-  std::array<char, 32> text{};
   const long whole = std::lround(seconds);
-  std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60,
-                whole % 60);
-  return text.data();
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+// How long a run in flight has flown: its newest whole row of flight.csv, which begins with the
+// time. Negative before the first.
+double flown_s(const std::filesystem::path& run) {
+  constexpr std::streamoff kTail = 1024;  // bytes that hold a row for certain
+  std::ifstream file(run / "flight.csv", std::ios::binary | std::ios::ate);
+  const std::streamoff size = file ? std::streamoff(file.tellg()) : 0;
+  file.seekg(std::max<std::streamoff>(0, size - kTail));
+  const std::string tail{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t end = tail.rfind('\n');
+  const std::size_t begin = end > 0 && end < tail.npos ? tail.rfind('\n', end - 1) : tail.npos;
+  double time_s = -1;
+  if (begin < tail.npos) std::from_chars(&tail[begin + 1], tail.data() + end, time_s);
+  return time_s;
+}
+
+// What tells a run from the others of its sweep.
+std::string title_of(const sim::PlannedRun& run, const sim::SweepPlan& plan) {
+  std::string title = run.scenario;
+  if (!run.variant.empty()) title += " " + run.variant;
+  for (std::size_t i = 0; run.variant.empty() && i < plan.keys.size(); ++i) {
+    title += " " + plan.keys[i].substr(plan.keys[i].rfind('.') + 1) + "=" + run.values[i];
+  }
+  title += fmt::format(" seed {}", run.seed);
+  return plan.repeats > 1 ? title + fmt::format(" repeat {}", run.repeat) : title;
+}
+
+// "forest seed 3 at 84 s, forest seed 4 starting"; a run that has no folder yet is not among them.
+std::string in_flight(const sim::SweepPlan& plan, const sim::SweepFolder& folder) {
+  std::string text;
+  for (const std::string& id : folder.partials()) {
+    const auto run = std::find_if(plan.runs.begin(), plan.runs.end(),
+                                  [&](const sim::PlannedRun& planned) { return planned.id == id; });
+    if (run == plan.runs.end()) continue;
+    const double time_s = flown_s(folder.root() / sim::SweepFolder::partial(id));
+    text += (text.empty() ? "" : ", ") + title_of(*run, plan);
+    text += time_s < 0 ? " starting" : fmt::format(" at {:.0f} s", time_s);
+  }
+  return text;
 }
 
 /// The line that a person watches, and a line of its own for every run that breaks.
@@ -60,19 +102,30 @@ class SweepLine {
                  static_cast<int>(name.size()), name.data(), state.detail.c_str());
   }
 
-  void update(const sim::SweepProgress& p) {
+  /// @param in_flight asked for only when the line is written
+  void update(const sim::SweepProgress& p, const std::function<std::string()>& in_flight) {
     const bool last = p.finished + p.broken == p.total;
     if (!on_terminal_ && !last && p.elapsed_s < next_s_) return;
     next_s_ = p.elapsed_s + 30;  // a log wants a line now and then
-    std::string left = p.left_s < 0 ? "?" : clock_text(p.left_s);
-    std::fprintf(stderr, "%s%zu/%zu done, %zu running, %zu missions failed, %zu broken, %s, ETA %s",
-                 on_terminal_ ? "\r\033[K" : "", done_ + p.finished, total_, p.running,
-                 p.missions_failed, p.broken, clock_text(p.elapsed_s).c_str(), left.c_str());
+    std::string line =
+        fmt::format("{}/{} done, {} missions failed, {} broken, {}, ETA {}", done_ + p.finished,
+                    total_, p.missions_failed, p.broken, clock_text(p.elapsed_s),
+                    p.left_s < 0 ? "?" : clock_text(p.left_s));
+    if (p.running > 0) line += fmt::format(", {} in flight: {}", p.running, in_flight());
+    if (on_terminal_) line = "\r\033[K" + cut(line);
+    std::fputs(line.c_str(), stderr);
     if (!on_terminal_) std::fputc('\n', stderr);
     open_ = on_terminal_;
   }
 
  private:
+  // A line that wraps could not be written over.
+  static std::string cut(const std::string& line) {
+    winsize size{};
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col < 2) return line;
+    return line.size() < size.ws_col ? line : line.substr(0, size.ws_col - 2U) + "…";
+  }
+
   std::size_t done_;
   std::size_t total_;
   bool on_terminal_;
@@ -203,7 +256,7 @@ int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
       folder, kSelf, {jobs, plan.timeout_s, plan.retries},
       {[&](const auto& order, const auto& state) { line.broken(order, state); },
        [&](const auto& progress) {
-         line.update(progress);
+         line.update(progress, [&] { return in_flight(plan, folder); });
          if (progress.elapsed_s < next_table_s) return;
          next_table_s = progress.elapsed_s + kTablePeriod_s;
          try {
@@ -261,8 +314,8 @@ std::size_t array_size_of_cluster() {
 }  // namespace
 
 int sweep(const SweepArguments& arguments) {
-  const sim::SweepPlan plan =
-      sim::expand(sim::load_sweep_file(arguments.file), sim::fingerprint(kSelf));
+  const sim::SweepPlan plan = sim::expand(sim::load_sweep_file(resolve_input_file(arguments.file)),
+                                          sim::content_hash_of_file(kSelf));
   if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 

@@ -1,9 +1,12 @@
-#include <array>
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdio>
 #include <string_view>
 
 #include "app/commands.h"
+#include "app/host.h"
+#include "pictures/picture.h"
 #include "run/file_io.h"
 #include "run/scenario.h"
 #include "worlds/export.h"
@@ -12,7 +15,8 @@
 namespace arex::app {
 namespace {
 
-constexpr double kMostCells = 5e8;  // of the ground-truth maps, 6 bytes each
+constexpr std::string_view kOverview = "world.png";  // of a world from a file
+constexpr double kMostCells = 5e8;                   // of the ground-truth maps, 6 bytes each
 
 /// A world recipe on its own: the keys of a scenario's `world` section at the top of the file.
 struct RecipeConfig {
@@ -27,22 +31,79 @@ struct RecipeConfig {
   }
 };
 
-worlds::World build(const ConfigNode& root, const RecipeConfig& recipe) {
+bool is_yaml(const std::filesystem::path& file) {
+  return file.extension() == ".yaml" || file.extension() == ".yml";
+}
+
+/// What somebody would write who had only this file to say.
+ConfigNode recipe_of(const std::string& file) {
+  ConfigNode root = parse_yaml("kind: file", file);
+  ConfigNode path;
+  path.kind = ConfigNode::Kind::kScalar;
+  path.where = "--";  // of the command line, to which it is relative
+  path.scalar = file;
+  set_value(root, "file.path", path.where, path);
+  return root;
+}
+
+/// The world, and of a file's what was understood of it. @param direct the file itself was given
+worlds::FileWorld build(const ConfigNode& root, const RecipeConfig& recipe, bool direct) {
+  const double radius_m = sim::load_airframe().radius_m;
   try {
-    return worlds::build_world(recipe.world, recipe.seed, sim::load_airframe().radius_m);
+    if (recipe.world.kind == worlds::WorldKind::kFile) {
+      return worlds::load_file_world(recipe.world.file, radius_m);
+    }
+    worlds::FileWorld built;
+    built.world = worlds::build_world(recipe.world, recipe.seed, radius_m);
+    return built;
   } catch (const ConfigError& error) {
-    throw ConfigError(given_last(root) + ": " + error.what());
+    if (direct) throw;
+    throw ConfigError(last_given(root) + ": " + error.what());
   }
+}
+
+/// The whole world from above, a little from the south, and what is above the start's storey cut
+/// away; a mast marks the start.
+void draw_overview(const worlds::World& world, const std::filesystem::path& file) {
+  constexpr double kStorey = 2.2;       // m above the start
+  constexpr double kMast = 1.0 / 60.0;  // of the world's extent
+  const sim::PictureOptions standard;
+  const Vec3 size = world.bounds.high - world.bounds.low;
+  const double aspect = static_cast<double>(standard.width) / standard.height;
+  const double seen = 1.05 * std::max(size.x(), 1.2 * size.y() * aspect);
+  const double height = seen / 2 / std::tan(standard.field_of_view_rad / 2);
+  Vec3 middle = 0.5 * (world.bounds.low + world.bounds.high);
+  middle.z() = world.X_WS.p.z();
+  sim::PictureOptions options;
+  options.visibility_m = 20 * height;
+  options.cut_above_m = world.X_WS.p.z() + kStorey;
+  sim::PictureOverlay overlay;
+  const double mast = kMast * std::max(size.x(), size.y());
+  const Vec3 p = world.X_WS.p;
+  overlay.paths.push_back({{p, p + Vec3(0, 0, 3 * mast)}, {0.9, 0.02, 0.12}, mast / 6});
+  overlay.paths.push_back(
+      {{p + 0.3 * mast * Vec3::UnitZ(), p + world.X_WS.R * Vec3(3 * mast, 0, 0.3 * mast)},
+       {0.95, 0.25, 0.1},
+       mast / 8});
+  const Pose X_WC = sim::look_at(middle + Vec3(0, -0.35 * height, height), middle);
+  sim::save_png(sim::render_picture(world, X_WC, options, overlay), file);
 }
 
 void check_size(const ConfigNode& root, const worlds::World& world, double resolution_m) {
   const double cells = (world.bounds.high - world.bounds.low).prod() / std::pow(resolution_m, 3);
   if (cells <= kMostCells) return;
-  std::array<char, 120> text{};
-  std::snprintf(text.data(), text.size(),
-                "export.resolution_m makes %.1e cells of this world, expected at most %.0e", cells,
-                kMostCells);
-  config_detail::fail(config_detail::locate_rule(root, text.data()), text.data());
+  const std::string rule =
+      fmt::format("export.resolution_m makes {:.1e} cells of this world, expected at most {:.0e}",
+                  cells, kMostCells);
+  config_detail::fail(config_detail::locate_rule(root, rule), rule);
+}
+
+/// Nobody asked for a resolution: one that a large world can be written in.
+void coarsen(const worlds::World& world, worlds::ExportConfig& exported) {
+  constexpr double kFew = 1e8;
+  const double volume = (world.bounds.high - world.bounds.low).prod();
+  const double least = std::cbrt(volume / kFew);
+  if (least > exported.resolution_m) exported.resolution_m = std::ceil(20 * least) / 20;
 }
 
 // What a run has there would be half replaced.
@@ -57,26 +118,37 @@ void expect_no_run(const std::filesystem::path& folder) {
 }  // namespace
 
 int world(const WorldArguments& arguments) {
-  ConfigNode root = load_yaml(arguments.file);
+  const bool direct = !is_yaml(arguments.file);
+  ConfigNode root =
+      direct ? recipe_of(arguments.file) : load_yaml(resolve_input_file(arguments.file));
   for (const std::string& assignment : arguments.overrides) apply_override(root, assignment);
   RecipeConfig recipe;
   if (root.find("world")) {
     const sim::Scenario scenario =
-        sim::load_scenario(arguments.file, arguments.overrides, arguments.seed);
+        sim::load_scenario(resolve_input_file(arguments.file), arguments.overrides, arguments.seed);
     recipe.world = scenario.config.world;
     recipe.seed = scenario.config.seed;
   } else {
     if (arguments.seed) sim::set_seed(root, *arguments.seed, "--seed");
     read_config(root, recipe);
+    sim::resolve_paths(root, recipe.world);
   }
+  const bool from_file = recipe.world.kind == worlds::WorldKind::kFile;
   const sim::OutputFolder folder(arguments.out);
   expect_no_run(folder.path());
   for (const std::string_view file : worlds::kExportedFiles) check_writable(folder.path() / file);
-  const worlds::World built = build(root, recipe);
-  check_size(root, built, recipe.exported.resolution_m);
-  worlds::export_world(built, recipe.exported, arguments.out);
+  if (from_file) check_writable(folder.path() / kOverview);
+  const worlds::FileWorld built = build(root, recipe, direct);
+  if (direct && !root.find("export")) coarsen(built.world, recipe.exported);
+  check_size(root, built.world, recipe.exported.resolution_m);
+  worlds::export_world(built.world, recipe.exported, arguments.out);
+  if (from_file) {
+    draw_overview(built.world, folder.path() / kOverview);
+    std::fputs(worlds::describe(built).c_str(), stdout);
+  }
   std::printf("%s: %zu objects, %zu triangles, %zu collision shapes\n", arguments.out.c_str(),
-              built.objects.size(), built.mesh.triangles.size(), built.collision_shapes.size());
+              built.world.objects.size(), built.world.mesh.triangles.size(),
+              built.world.collision_shapes.size());
   return 0;
 }
 

@@ -31,7 +31,8 @@ void add_file(mjVFS& files, const char* name, std::string_view text) {
 }
 
 /// The scene with room for terrain and slots; their contents follow at run time.
-std::string scene_xml(const worlds::HeightField& terrain, double relief_m, int slots) {
+std::string scene_xml(const worlds::HeightField& terrain, double relief_m, int slots,
+                      bool has_mesh) {
   std::ostringstream xml;
   xml.precision(17);
   xml << "<mujoco model='scene'><include file='arex.xml'/>";
@@ -47,8 +48,16 @@ std::string scene_xml(const worlds::HeightField& terrain, double relief_m, int s
   for (int i = 0; i < slots; ++i) {
     xml << "<geom name='slot_" << i << "' type='box' size='1 1 1' contype='0' conaffinity='0'/>";
   }
+  if (has_mesh) {
+    xml << "<geom name='mesh' type='sphere' size='1' contype='0' conaffinity='0'/>";
+  }
   xml << "</worldbody></mujoco>";
   return xml.str();
+}
+
+bool has_contact_mesh(const worlds::World& world) {
+  return std::any_of(world.objects.begin(), world.objects.end(),
+                     [](const worlds::Object& object) { return object.felt; });
 }
 
 double relief(const worlds::HeightField& terrain) {
@@ -79,6 +88,16 @@ double lowest_of(const CollisionShape& shape) {
       break;
   }
   return shape.X_WS.p.z() - reach;
+}
+
+/// The normal and two tangents, row by row, as MuJoCo chooses them.
+void put_frame(const Vec3& normal, mjtNum* frame) {
+  const Vec3 seed = std::abs(normal.y()) < 0.5 ? Vec3::UnitY() : Vec3::UnitZ();
+  const Vec3 first = (seed - seed.dot(normal) * normal).normalized();
+  const Vec3 second = normal.cross(first);
+  std::copy_n(normal.data(), 3, frame);
+  std::copy_n(first.data(), 3, frame + 3);
+  std::copy_n(second.data(), 3, frame + 6);
 }
 
 int require_name(const mjModel& model, mjtObj kind, const std::string& name) {
@@ -190,9 +209,11 @@ ContactScene::ContactScene(const worlds::World& world, const ContactConfig& conf
     : world_(world),
       config_(config),
       index_(world.collision_shapes),
-      model_(with_body(compile_model(scene_xml(world.terrain, relief(world.terrain), config.slots)),
+      model_(with_body(compile_model(scene_xml(world.terrain, relief(world.terrain), config.slots,
+                                               has_contact_mesh(world))),
                        body)),
       airframe_(read_airframe(*model_, body)),
+      mesh_(world, airframe_.shapes),
       shape_of_slot_(static_cast<std::size_t>(config.slots)) {
   if (config.search_radius_m <= airframe_.radius_m + kGuard_m) {
     throw std::invalid_argument("contact.search_radius_m must exceed the vehicle's radius");
@@ -202,6 +223,8 @@ ContactScene::ContactScene(const worlds::World& world, const ContactConfig& conf
     // The compiler found the geom in its body's own frame and would copy that instead of the pose.
     model_->geom_sameframe[first_slot_geom_ + slot] = 0;
   }
+  if (!mesh_.empty()) mesh_geom_ = require_name(*model_, mjOBJ_GEOM, "mesh");
+  first_vehicle_geom_ = model_->body_geomadr[require_name(*model_, mjOBJ_BODY, "arex")];
   load_terrain();
 }
 
@@ -238,13 +261,72 @@ void ContactScene::update(const Vec3& p_WB) {
     refill(p_WB);
     moved = 0;
   }
+  near_mesh_ = !mesh_.empty() && is_near_mesh(p_WB, reach);
   const bool may_touch =
-      moved + reach >= nearest_shape_m_ || p_WB.z() - reach <= highest_terrain_m_;
+      near_mesh_ || moved + reach >= nearest_shape_m_ || p_WB.z() - reach <= highest_terrain_m_;
   if (may_touch) {
     model_->opt.disableflags &= ~mjDSBL_CONTACT;
   } else {
     model_->opt.disableflags |= mjDSBL_CONTACT;
   }
+}
+
+// Measured anew only when the vehicle may have come within reach since.
+bool ContactScene::is_near_mesh(const Vec3& p_WB, double reach_m) {
+  const double moved = (p_WB - mesh_centre_).norm();
+  if (mesh_distance_m_ < 0 || mesh_distance_m_ - moved <= reach_m) {
+    mesh_centre_ = p_WB;
+    mesh_distance_m_ = mesh_.distance(p_WB, config_.search_radius_m + reach_m);
+  }
+  const bool near = mesh_.held() || mesh_distance_m_ - (p_WB - mesh_centre_).norm() <= reach_m;
+  // As long as nothing is in reach, the vehicle's middle has not passed through anything.
+  if (!near && !near_mesh_) mesh_.reset(p_WB);
+  return near;
+}
+
+void ContactScene::put_vehicle(const Vec3& p_WB) {
+  mesh_.reset(p_WB);
+  mesh_distance_m_ = -1;
+}
+
+void ContactScene::step(mjData& data, const Pose& X_WB) {
+  if (!near_mesh_) {
+    mesh_objects_.clear();
+    mj_step(model_.get(), &data);
+    return;
+  }
+  mj_step1(model_.get(), &data);
+  add_mesh_contacts(data, X_WB);
+  mj_step2(model_.get(), &data);
+}
+
+// Between MuJoCo's own collision stage and its solver; what the first half of the step worked out
+// of the contacts is worked out again.
+void ContactScene::add_mesh_contacts(mjData& data, const Pose& X_WB) {
+  first_mesh_contact_ = data.ncon;
+  mesh_objects_.clear();
+  for (const MeshTouch& touch : mesh_.find(X_WB)) {
+    mjContact contact{};
+    contact.dist = -touch.depth_m;
+    std::copy_n(touch.p_W.data(), 3, contact.pos);
+    put_frame(touch.normal_W, contact.frame);
+    contact.geom1 = mesh_geom_;
+    contact.geom2 = first_vehicle_geom_ + static_cast<int>(touch.shape);
+    // All geoms of the model are of one material.
+    const mjtNum* friction = model_->geom_friction + 3 * contact.geom2;
+    const std::array<mjtNum, 5> per_axis{friction[0], friction[0], friction[1], friction[2],
+                                         friction[2]};
+    std::copy(per_axis.begin(), per_axis.end(), contact.friction);
+    std::copy_n(model_->geom_solref + mjNREF * contact.geom2, mjNREF, contact.solref);
+    std::copy_n(model_->geom_solimp + mjNIMP * contact.geom2, mjNIMP, contact.solimp);
+    contact.dim = model_->geom_condim[contact.geom2];
+    if (mj_addContact(model_.get(), &data, &contact) != 0) break;
+    mesh_objects_.push_back(world_.mesh.object_of_triangle[touch.triangle]);
+  }
+  if (mesh_objects_.empty()) return;
+  mj_makeConstraint(model_.get(), &data);
+  mj_projectConstraint(model_.get(), &data);
+  mj_referenceConstraint(model_.get(), &data);
 }
 
 void ContactScene::refill(const Vec3& p_WB) {
@@ -321,7 +403,9 @@ double ContactScene::highest_terrain(const Vec2& centre, double radius_m) const 
   return highest;
 }
 
-std::uint32_t ContactScene::object_of_geom(int geom) const {
+std::uint32_t ContactScene::object_of_contact(int contact, int geom) const {
+  if (geom == mesh_geom_)
+    return mesh_objects_[static_cast<std::size_t>(contact - first_mesh_contact_)];
   if (geom == terrain_geom_) return terrain_object_;
   const std::uint32_t shape = shape_of_slot_[static_cast<std::size_t>(geom - first_slot_geom_)];
   return world_.collision_shapes[shape].object;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "physics/airframe.h"
+#include "physics/mesh_contact.h"
 #include "physics/physics_config.h"
 #include "physics/shape_index.h"
 #include "worlds/world.h"
@@ -42,6 +43,9 @@ AirframePart part_of_geom(const mjModel& model, int geom);
 /// with all shapes loaded (up to `slots` shapes within the vehicle's own sphere): shapes stand in
 /// the slots in the order of their index, so contacts come in the same order too. While nothing at
 /// all is within the vehicle's sphere, MuJoCo's collision stage is switched off.
+///
+/// Triangles that can be felt are no geoms: MuJoCo knows convex solids only. Their contacts are
+/// worked out here and handed to its solver.
 class ContactScene {
  public:
   ContactScene(const worlds::World& world, const ContactConfig& config,
@@ -49,13 +53,19 @@ class ContactScene {
 
   /// To be called before each step with the vehicle's position.
   void update(const Vec3& p_WB);
+  /// One step of MuJoCo. @pre update() was called for the pose in `data`, X_WB
+  void step(mjData& data, const Pose& X_WB);
+  /// The vehicle is put somewhere instead of flying there.
+  void put_vehicle(const Vec3& p_WB);
 
   [[nodiscard]] mjModel& model() { return *model_; }
   [[nodiscard]] const Airframe& airframe() const { return airframe_; }
-  /// The object that a geom of the world stands for.
-  [[nodiscard]] std::uint32_t object_of_geom(int geom) const;
+  /// The object that a contact of the last step was with; `geom` is that of the world in it.
+  [[nodiscard]] std::uint32_t object_of_contact(int contact, int geom) const;
 
  private:
+  bool is_near_mesh(const Vec3& p_WB, double reach_m);
+  void add_mesh_contacts(mjData& data, const Pose& X_WB);
   void load_terrain();
   void refill(const Vec3& p_WB);
   void put(int slot, const worlds::CollisionShape& shape);
@@ -70,6 +80,14 @@ class ContactScene {
   int terrain_geom_ = -1;
   int first_slot_geom_ = -1;
   std::uint32_t terrain_object_ = 0;
+  MeshContacts mesh_;
+  int mesh_geom_ = -1;  ///< stands for all triangles
+  int first_vehicle_geom_ = -1;
+  int first_mesh_contact_ = 0;               ///< of the last step
+  std::vector<std::uint32_t> mesh_objects_;  ///< of its contacts from there on
+  Vec3 mesh_centre_ = Vec3::Zero();          ///< where mesh_distance_m_ was measured
+  double mesh_distance_m_ = -1;              ///< to the nearest triangle; negative: not yet
+  bool near_mesh_ = false;
 
   // What the slots were filled for.
   bool filled_ = false;

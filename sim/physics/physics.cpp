@@ -59,6 +59,7 @@ class Physics::Impl {
     truth_.w_WB_B = w_WB_B;
     truth_.a_WB = truth_.alpha_WB_B = Vec3::Zero();
     truth_.rotor_radps = rotor_radps;
+    scene_.put_vehicle(X_WB.p);
     contacts_.clear();
   }
 
@@ -67,7 +68,7 @@ class Physics::Impl {
     wind_.step();
     apply_forces();
     scene_.update(truth_.X_WB.p);
-    mj_step(&scene_.model(), data_.get());
+    scene_.step(*data_, truth_.X_WB);
     check_health();
     read_contacts();  // MuJoCo finds contacts before it moves: truth_ still holds that moment
     read_truth();
@@ -133,7 +134,7 @@ class Physics::Impl {
       const int world_geom = vehicle_second ? touch.geom1 : touch.geom2;
       Contact contact;
       contact.part = part_of_geom(model, vehicle_geom);
-      contact.object = scene_.object_of_geom(world_geom);
+      contact.object = scene_.object_of_contact(i, world_geom);
       contact.surface_class = world_.objects.at(contact.object).surface_class;
       contact.p_W = Vec3(touch.pos[0], touch.pos[1], touch.pos[2]);
       // MuJoCo's normal points from geom1 to geom2.

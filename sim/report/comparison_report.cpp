@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "report/overlay.h"
 #include "report/page.h"
 #include "report/payload.h"
 #include "scoring/figures.h"
@@ -18,6 +19,7 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kMaxCells = 250'000;  // of the page's table: about 3 MB
 constexpr std::size_t kMaxLinks = 12;       // to the runs of one cause
+constexpr std::size_t kMaxPlainRows = 500;  // of the table that needs no script
 
 // Columns of words, whatever digits stand in them: a seed read as a number loses its last ones.
 bool is_text(const std::string& column) {
@@ -42,8 +44,9 @@ ordered_json figures_json(const std::vector<std::string>& columns) {
     const int better = figure->better == Better::kMore   ? 1
                        : figure->better == Better::kLess ? -1
                                                          : 0;
-    figures[column] = {{"label", figure->label},
-                       {"unit", figure->unit},
+    const auto name = figure->name_in(column);
+    figures[column] = {{"label", (name ? figure->named(*name) : *figure).label},
+                       {"unit", unit_text(figure->unit)},
                        {"better", better},
                        {"main", figure->main}};
   }
@@ -69,6 +72,13 @@ std::string link_to(const std::filesystem::path& run, const std::filesystem::pat
     }
   }
   return reported ? link : link + "/";
+}
+
+std::string link_html(const std::filesystem::path& run, const std::filesystem::path& directory,
+                      const std::string& title) {
+  const std::string link = link_to(run, directory);
+  if (link.empty()) return escape_markup(title);
+  return "<a href=\"" + escape_markup(link) + "\">" + escape_markup(title) + "</a>";
 }
 
 // Why a run is no success: how it broke, or how its mission ended. Empty for a success.
@@ -116,27 +126,69 @@ std::string failures_html(const ResultTable& results, const std::filesystem::pat
   std::string html = "<section>\n<h2>Failures by cause</h2>\n";
   if (table.rows.empty()) return html + "<p>No run was flown.</p>\n</section>\n";
   if (causes.empty()) return html + "<p>None: every run succeeded.</p>\n</section>\n";
+  const std::vector<std::string> titles = run_titles(results);
   html +=
       "<div class=\"scroll\"><table class=\"data\">\n<thead><tr><th class=\"word\">cause</th>"
       "<th>runs</th><th class=\"text\">told as</th><th class=\"text\">which</th></tr></thead>\n"
       "<tbody>\n";
   for (const auto& [cause, reasons] : causes) {
     for (const auto& [reason, rows] : reasons) {
-      html += "<tr><td class=\"word\">" + escape_markup(cause) + "</td><td>" +
+      html += "<tr><td class=\"word\">" + escape_markup(words(cause)) + "</td><td>" +
               std::to_string(rows.size()) + "</td><td class=\"text\">" + escape_markup(reason) +
               "</td><td class=\"text\">";
       for (std::size_t i = 0; i < std::min(rows.size(), kMaxLinks); ++i) {
-        const std::filesystem::path& folder = results.folders[rows[i]];
-        const std::string link = link_to(folder, directory);
-        const std::string name = escape_markup(run_title(results, rows[i]));
         html += i > 0 ? "; " : "";
-        html += link.empty() ? name : "<a href=\"" + escape_markup(link) + "\">" + name + "</a>";
+        html += link_html(results.folders[rows[i]], directory, titles[rows[i]]);
       }
       if (rows.size() > kMaxLinks) html += "; …";
       html += "</td></tr>\n";
     }
   }
   return html + "</tbody>\n</table></div>\n</section>\n";
+}
+
+// The main figures of each run, which the viewer replaces by a table that sorts.
+std::string runs_html(const ResultTable& results, const std::filesystem::path& directory) {
+  const Table& table = results.table;
+  if (table.rows.empty()) return {};
+  std::vector<std::pair<std::size_t, const FigureInfo*>> columns;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const FigureInfo* figure = find_figure(table.columns[c]);
+    const auto measured = [c](const auto& row) { return !row[c].empty(); };
+    if (!figure || !figure->main) continue;
+    if (std::any_of(table.rows.begin(), table.rows.end(), measured)) columns.push_back({c, figure});
+  }
+  std::string html =
+      "<h2>Runs</h2>\n<div class=\"scroll\"><table class=\"data\">\n<thead><tr>"
+      "<th class=\"word\">run</th>";
+  for (const auto& [column, figure] : columns) {
+    const bool text = figure->kind == FigureInfo::Kind::kText;
+    const std::string unit = figure->unit == "1" ? "%" : unit_text(figure->unit);
+    html += (text ? "<th class=\"word\">" : "<th>") + escape_markup(figure->label) +
+            (unit.empty() ? "" : ", " + unit) + "</th>";
+  }
+  html += "</tr></thead>\n<tbody>\n";
+  const std::vector<std::string> titles = run_titles(results);
+  for (std::size_t i = 0; i < std::min(table.rows.size(), kMaxPlainRows); ++i) {
+    html +=
+        "<tr><td class=\"word\">" + link_html(results.folders[i], directory, titles[i]) + "</td>";
+    for (const auto& [column, figure] : columns) {
+      const std::string& cell = table.rows[i][column];
+      const auto number = parse_number(cell);
+      if (figure->kind == FigureInfo::Kind::kText || !number) {
+        html += "<td class=\"word\">" + escape_markup(words(cell)) + "</td>";
+      } else {
+        html += "<td>" + number_text((figure->unit == "1" ? 100 : 1) * *number, 4) + "</td>";
+      }
+    }
+    html += "</tr>\n";
+  }
+  html += "</tbody>\n</table></div>\n";
+  if (table.rows.size() > kMaxPlainRows) {
+    html += "<p class=\"note\">The first " + std::to_string(kMaxPlainRows) + " of " +
+            std::to_string(table.rows.size()) + ".</p>\n";
+  }
+  return html;
 }
 
 std::string header_html(const ResultTable& results, const std::string& title) {
@@ -148,14 +200,15 @@ std::string header_html(const ResultTable& results, const std::string& title) {
     ++counts[cause.empty() ? "succeeded" : cause];
     if (const std::string seed = table.text(i, "seed"); !seed.empty()) seeds.insert(seed);
   }
-  std::vector<KeyFigure> figures{{"Runs", std::to_string(table.rows.size()), ""},
-                                 {"Seeds", std::to_string(seeds.size()), ""}};
+  std::vector<KeyFigure> figures{{"runs", std::to_string(table.rows.size()), ""},
+                                 {"seeds", std::to_string(seeds.size()), ""}};
   const std::size_t successes = counts["succeeded"];
   counts.erase("succeeded");
   std::size_t flown = successes;
   for (const auto& [cause, count] : counts) flown += was_flown(cause) ? count : 0;
   figures.push_back({"succeeded", std::to_string(successes), share_text(successes, flown)});
-  for (const auto& [cause, count] : counts) figures.push_back({cause, std::to_string(count), ""});
+  for (const auto& [cause, count] : counts)
+    figures.push_back({words(cause), std::to_string(count), ""});
   std::string html = "<h1>" + escape_markup(title) + "</h1>\n";
   std::string varied;
   for (const std::string& key : results.keys) {
@@ -188,6 +241,7 @@ ordered_json comparison_payload(const ResultTable& results,
   ordered_json rows = ordered_json::array();
   ordered_json links = ordered_json::array();
   ordered_json runs = ordered_json::array();
+  const std::vector<std::string> titles = run_titles(results);
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     ordered_json row = ordered_json::array();
     for (const std::size_t column : columns) {
@@ -199,20 +253,25 @@ ordered_json comparison_payload(const ResultTable& results,
   }
   return {{"kind", "sweep"},      {"figures", figures_json(names)},
           {"keys", results.keys}, {"columns", names},
-          {"rows", rows},         {"runs", runs},
-          {"links", links}};
+          {"rows", rows},         {"titles", titles},
+          {"runs", runs},         {"links", links}};
 }
 
 std::string comparison_report_html(const ResultTable& results, const std::string& title,
                                    const std::filesystem::path& directory) {
+  const Overlay overlay = overlay_of(results);
+  ordered_json payload = comparison_payload(results, directory);
+  payload["overlay"] = overlay_json(overlay);
   std::string html = header_html(results, title);
   html +=
-      "<noscript><p class=\"notice\">Curves, heat map and the table of runs need JavaScript; "
-      "the numbers are in sweep.csv.</p></noscript>\n";
-  html += "<section id=\"figures\"></section>\n";
+      "<noscript><p class=\"notice\">Curves, heat map and statistics need JavaScript; the rest of "
+      "this page does not.</p></noscript>\n";
+  html += "<section id=\"figures\"></section>\n<section id=\"coverage\"></section>\n";
+  html += overlaid_paths_html(results, overlay);
   html += failures_html(results, directory);
-  html += "<section id=\"side\"></section>\n<section id=\"runs\"></section>\n";
-  return report_page("AREX: " + title, html, comparison_payload(results, directory));
+  html += "<section id=\"side\"></section>\n";
+  html += "<section id=\"runs\">" + runs_html(results, directory) + "</section>\n";
+  return report_page("AREX: " + title, html, payload);
 }
 
 }  // namespace arex::sim

@@ -1,21 +1,23 @@
 #include "report/map_picture.h"
 
+#include <fmt/format.h>
 #include <png.h>
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 
 #include "report/payload.h"
+#include "report/svg.h"
 #include "report/targets.h"
 
 namespace arex::sim {
 namespace {
 
-constexpr double kCloudCell = 0.2;      // m, of the stand-in for a 2D map
-constexpr std::size_t kMaxPath = 3000;  // corners of a drawn path
+constexpr double kCloudCell = 0.2;             // m, of the stand-in for a 2D map
+constexpr std::size_t kMaxPath = 3000;         // corners of a drawn path
+constexpr std::size_t kMaxOverlaidPath = 800;  // likewise, of one among many
 
 /// A picture of few colours and its place in O.
 struct Backdrop {
@@ -119,26 +121,24 @@ Backdrop backdrop_of(const std::vector<Vec3f>& points_O) {
   return backdrop;
 }
 
-template <typename... Numbers>
-std::string format(const char* pattern, Numbers... numbers) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, numbers...);
-  return text.data();
+std::string points_text(const std::vector<TimedPose>& poses, std::size_t most) {
+  std::string points;
+  const std::size_t step = poses.size() / most + 1;
+  for (std::size_t i = 0; i < poses.size(); i += step) {
+    points += fmt::format("{:.2f},{:.2f} ", poses[i].X.p.x(), -poses[i].X.p.y());
+  }
+  return points + fmt::format("{:.2f},{:.2f}", poses.back().X.p.x(), -poses.back().X.p.y());
 }
 
-std::string polyline(const std::vector<StampedPose>& poses, const char* name) {
+std::string polyline(const std::vector<TimedPose>& poses, const char* name) {
   if (poses.empty()) return {};
-  std::string points;
-  const std::size_t step = poses.size() / kMaxPath + 1;
-  for (std::size_t i = 0; i < poses.size(); i += step) {
-    points += format("%.2f,%.2f ", poses[i].X_OB.p.x(), -poses[i].X_OB.p.y());
-  }
-  points += format("%.2f,%.2f", poses.back().X_OB.p.x(), -poses.back().X_OB.p.y());
-  return "<polyline class=\"" + std::string(name) + "\" points=\"" + points + "\"/>\n";
+  return "<polyline class=\"" + std::string(name) + "\" points=\"" + points_text(poses, kMaxPath) +
+         "\"/>\n";
 }
 
 std::string circle(double x, double y, double radius, const char* name, const std::string& title) {
-  return format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" class=\"%s\">", x, -y, radius, name) +
+  return fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" class=\"{}\">", x, -y,
+                     radius, name) +
          "<title>" + escape_markup(title) + "</title></circle>\n";
 }
 
@@ -153,61 +153,72 @@ std::string candidates_svg(const Table& decisions, double radius) {
     if (!std::isfinite(x[i]) || !std::isfinite(y[i]) || decisions.text(i, "verdict") != "kept") {
       continue;
     }
-    path += format("M%.1f %.1fh0", x[i], -y[i]);
+    path += fmt::format("M{:.1f} {:.1f}h0", x[i], -y[i]);
   }
   if (path.empty()) return {};
-  return format("<path class=\"candidates\" stroke-width=\"%.2f\" d=\"", 1.2 * radius) + path +
-         "\"/>\n";
+  return fmt::format("<path class=\"candidates\" stroke-width=\"{:.2f}\" d=\"", 1.2 * radius) +
+         path + "\"/>\n";
 }
 
-// A bar of a round length in the lower left corner.
-std::string scale_bar(const Eigen::AlignedBox2d& box, double unit) {
-  const double width = box.sizes().x();
-  double length = 1;
-  for (const double candidate : {2., 5., 10., 20., 50., 100., 200., 500.}) {
-    if (candidate < 0.3 * width) length = candidate;
+/// What a picture shows of the plane, with a rim of one mark's size.
+struct View {
+  Eigen::AlignedBox2d box;
+  double unit = 0;  ///< what a mark measures
+};
+
+View view_of(Eigen::AlignedBox2d box, const Backdrop& backdrop) {
+  if (backdrop.width > 0) {
+    box.extend(Vec2(backdrop.x_m, backdrop.y_m));
+    box.extend(Vec2(backdrop.x_m + backdrop.width * backdrop.cell_m,
+                    backdrop.y_m - backdrop.height * backdrop.cell_m));
   }
-  const double x = box.min().x() + 1.5 * unit;
-  const double y = -box.min().y() - 1.5 * unit;
-  return format("<path class=\"scale\" d=\"M%.2f %.2fv%.2fh%.2fv%.2f\"/>", x, y - 0.6 * unit,
-                0.6 * unit, length, -0.6 * unit) +
-         format("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\">%g m</text>\n", x + 0.4 * unit,
-                y - 0.5 * unit, 1.6 * unit, length);
+  const double unit = std::max(5.0, box.sizes().maxCoeff()) / 80;
+  box.extend(Vec2(box.min() - Vec2::Constant(unit)));
+  box.extend(Vec2(box.max() + Vec2::Constant(unit)));
+  return {box, unit};
+}
+
+// The picture's beginning: its frame and what is known of the plane.
+std::string open_svg(const View& view, const Backdrop& backdrop, const char* attributes) {
+  const Eigen::AlignedBox2d& box = view.box;
+  std::string svg =
+      fmt::format(
+          "<svg class=\"map\" role=\"img\" viewBox=\"{:.2f} {:.2f} {:.2f} {:.2f}\" "
+          "data-unit=\"{:.3f}\" ",
+          box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), view.unit) +
+      attributes + ">\n";
+  if (backdrop.width > 0) {
+    svg += fmt::format(
+               "<image x=\"{:.3f}\" y=\"{:.3f}\" width=\"{:.3f}\" height=\"{:.3f}\" "
+               "preserveAspectRatio=\"none\" href=\"",
+               backdrop.x_m, -backdrop.y_m, backdrop.width * backdrop.cell_m,
+               backdrop.height * backdrop.cell_m) +
+           png_data_uri(backdrop) + "\"/>\n";
+  }
+  return svg;
+}
+
+Backdrop backdrop_of(const RunRecord& run) {
+  return run.map ? backdrop_of(*run.map) : backdrop_of(run.cloud.points_O);
 }
 
 }  // namespace
 
 std::string map_picture_svg(const RunRecord& run) {
   if (run.truth.empty() && run.estimate.empty()) return {};
-  const Backdrop backdrop = run.map ? backdrop_of(*run.map) : backdrop_of(run.cloud.points_O);
+  const Backdrop backdrop = backdrop_of(run);
   const std::vector<RunTarget> targets = run_targets(run.events);
 
   Eigen::AlignedBox2d box;
   for (const auto* poses : {&run.truth, &run.estimate}) {
-    for (const StampedPose& pose : *poses) box.extend(pose.X_OB.p.head<2>());
+    for (const TimedPose& pose : *poses) box.extend(pose.X.p.head<2>());
   }
   for (const RunTarget& target : targets) box.extend(target.p_O.head<2>());
-  if (backdrop.width > 0) {
-    box.extend(Vec2(backdrop.x_m, backdrop.y_m));
-    box.extend(Vec2(backdrop.x_m + backdrop.width * backdrop.cell_m,
-                    backdrop.y_m - backdrop.height * backdrop.cell_m));
-  }
-  const double unit = std::max(5.0, box.sizes().maxCoeff()) / 80;  // what a mark measures
-  box.extend(Vec2(box.min() - Vec2::Constant(unit)));
-  box.extend(Vec2(box.max() + Vec2::Constant(unit)));
+  const View view = view_of(box, backdrop);
+  const double unit = view.unit;
 
-  std::string svg = format(
-      "<svg id=\"path-map\" role=\"img\" aria-label=\"Flown path over the 2D map\" "
-      "viewBox=\"%.2f %.2f %.2f %.2f\" data-unit=\"%.3f\">\n",
-      box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y(), unit);
-  if (backdrop.width > 0) {
-    svg += format(
-               "<image x=\"%.3f\" y=\"%.3f\" width=\"%.3f\" height=\"%.3f\" "
-               "preserveAspectRatio=\"none\" href=\"",
-               backdrop.x_m, -backdrop.y_m, backdrop.width * backdrop.cell_m,
-               backdrop.height * backdrop.cell_m) +
-           png_data_uri(backdrop) + "\"/>\n";
-  }
+  std::string svg =
+      open_svg(view, backdrop, "id=\"path-map\" aria-label=\"Flown path over the 2D map\"");
   svg += candidates_svg(run.decisions, 0.5 * unit);
   svg += polyline(run.truth, "truth");
   svg += polyline(run.estimate, "estimate");
@@ -216,18 +227,37 @@ std::string map_picture_svg(const RunRecord& run) {
     svg +=
         circle(target.p_O.x(), target.p_O.y(), 0.55 * unit, target.reached ? "reached" : "target",
                "target " + std::to_string(i + 1) + ", selected at " +
-                   format("%.1f s", target.time_s) + (target.reached ? ", reached" : ""));
+                   fmt::format("{:.1f} s", target.time_s) + (target.reached ? ", reached" : ""));
   }
   if (!run.truth.empty()) {
-    const Vec3& start = run.truth.front().X_OB.p;
-    const Vec3& end = run.truth.back().X_OB.p;
-    svg += circle(start.x(), start.y(), 0.9 * unit, "start", "start");
-    svg += format("<path class=\"end\" d=\"M%.2f %.2fl%.2f %.2fm0 %.2fl%.2f %.2f\">",
-                  end.x() - 0.8 * unit, -end.y() - 0.8 * unit, 1.6 * unit, 1.6 * unit, -1.6 * unit,
-                  -1.6 * unit, 1.6 * unit) +
-           "<title>end</title></path>\n";
+    svg += svg_ends(run.truth.front().X.p.head<2>(), run.truth.back().X.p.head<2>(), unit);
   }
-  return svg + scale_bar(box, unit) + "</svg>\n";
+  return svg + svg_scale_bar(view.box, unit) + "</svg>\n";
+}
+
+std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<DrawnPath>& paths) {
+  Eigen::AlignedBox2d box;
+  for (const DrawnPath& path : paths) {
+    for (const TimedPose& pose : *path.poses) box.extend(pose.X.p.head<2>());
+  }
+  if (box.isEmpty()) return {};
+  const Backdrop backdrop = backdrop_of(backdrop_run);
+  const View view = view_of(box, backdrop);
+  std::string svg = open_svg(view, backdrop, "aria-label=\"Flown paths over the map\"");
+  std::string ends;
+  for (const auto& [poses, colour, title] : paths) {
+    if (poses->empty()) continue;
+    const std::string name = "<title>" + escape_markup(title) + "</title>";
+    svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
+           points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
+    const Vec3& end = poses->back().X.p;
+    ends += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:", end.x(),
+                        -end.y(), 0.6 * view.unit) +
+            colour + "\">" + name + "</circle>\n";
+  }
+  const Vec3& start = paths.front().poses->front().X.p;
+  svg += ends + circle(start.x(), start.y(), 0.9 * view.unit, "start", "start");
+  return svg + svg_scale_bar(view.box, view.unit) + "</svg>\n";
 }
 
 }  // namespace arex::sim

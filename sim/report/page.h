@@ -11,6 +11,9 @@ namespace arex::sim {
 std::string report_page(const std::string& title, const std::string& main,
                         const nlohmann::ordered_json& payload);
 
+/// The same of a page that needs no script.
+std::string report_page(const std::string& title, const std::string& main);
+
 /// One figure of the summary at the top.
 struct KeyFigure {
   std::string label;
@@ -21,6 +24,12 @@ std::string key_figures_html(const std::vector<KeyFigure>& figures);
 
 /// Shortest text of a number with so many significant digits.
 std::string number_text(double value, int digits = 3);
+
+/// A unit as people write it: m² for m^2.
+std::string unit_text(const std::string& unit);
+
+/// A typed name in words: "no candidates" for no_candidates.
+std::string words(std::string name);
 
 /// A share in percent. What is not the whole is never rounded to 100 %.
 std::string percent_text(double share);

@@ -26,7 +26,7 @@ inline constexpr std::uint16_t kMissingLevel = 65535;
 nlohmann::ordered_json quantised(std::span<const double> values);
 nlohmann::ordered_json quantised(std::span<const float> values);
 
-/// JSON that may stand inside <script>: no '<' appears in it.
+/// JSON that may stand inside `<script>`: no '<' appears in it.
 std::string json_for_script(const nlohmann::ordered_json& json);
 
 }  // namespace arex::sim

@@ -128,9 +128,7 @@ void add_differing_keys(std::vector<ResultRow>& rows) {
   std::vector<std::map<std::string, std::string>> values;
   std::vector<std::string> keys;
   for (const ResultRow& row : rows) {
-    Cells cells;
-    const auto yaml = read_bytes(row.folder / "resolved.yaml");
-    if (yaml) flatten_yaml(parse_yaml(*yaml, (row.folder / "resolved.yaml").string()), "", cells);
+    const Cells cells = resolved_keys(row.folder);
     for (const auto& [key, value] : cells) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) keys.push_back(key);
     }
@@ -148,6 +146,23 @@ void add_differing_keys(std::vector<ResultRow>& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (const std::string& key : keys) rows[i].keys.emplace_back(key, values[i][key]);
   }
+}
+
+// The last parts of dotted keys, or all of a key whose last part another one has as well.
+std::vector<std::string> names_of(const std::vector<std::string>& keys) {
+  std::map<std::string, int> counts;
+  const auto last = [](const std::string& key) { return key.substr(key.rfind('.') + 1); };
+  for (const std::string& key : keys) ++counts[last(key)];
+  std::vector<std::string> names;
+  for (const std::string& key : keys) names.push_back(counts[last(key)] > 1 ? key : last(key));
+  return names;
+}
+
+bool varies(const Table& table, const std::string& key) {
+  for (std::size_t i = 1; i < table.rows.size(); ++i) {
+    if (table.text(i, key) != table.text(0, key)) return true;
+  }
+  return false;
 }
 
 // Columns in the order of their first appearance.
@@ -206,24 +221,49 @@ ResultTable read_results(const std::vector<std::filesystem::path>& folders) {
   return results;
 }
 
-std::string run_title(const ResultTable& results, std::size_t row) {
+std::vector<std::pair<std::string, std::string>> resolved_keys(const std::filesystem::path& run) {
+  Cells cells;
+  const std::filesystem::path file = run / "resolved.yaml";
+  if (const auto yaml = read_bytes(file)) flatten_yaml(parse_yaml(*yaml, file.string()), "", cells);
+  return cells;
+}
+
+std::vector<std::string> configuration_titles(const ResultTable& results) {
   const Table& table = results.table;
-  std::string title;
-  const auto add = [&](const std::string& name, const std::string& value) {
-    if (!title.empty()) title += ", ";
-    title += name + " " + value;
-  };
-  for (const std::string& key : results.keys) {
-    const std::string value = table.text(row, key);
-    bool varies = false;
-    for (std::size_t i = 0; i < table.rows.size() && !varies; ++i) {
-      varies = table.text(i, key) != value;
+  std::vector<std::string> titles(table.rows.size());
+  const std::vector<std::string> names = names_of(results.keys);
+  for (std::size_t k = 0; k < results.keys.size(); ++k) {
+    const std::string& key = results.keys[k];
+    if (!varies(table, key)) continue;
+    // These have values that are words of their own.
+    const bool bare = key == "scenario" || key == "variant" || key == "sweep";
+    for (std::size_t i = 0; i < titles.size(); ++i) {
+      const std::string value = table.text(i, key);
+      if (bare && value.empty()) continue;
+      if (!titles[i].empty()) titles[i] += ", ";
+      titles[i] += bare ? value : names[k] + " " + (value.empty() ? "–" : value);
     }
-    if (varies) add(key.substr(key.rfind('.') + 1), value.empty() ? "–" : value);
   }
-  const std::string seed = table.text(row, "seed");
-  if (!seed.empty()) add("seed", seed);
-  return title.empty() ? results.folders[row].filename().string() : title;
+  return titles;
+}
+
+std::vector<std::string> run_titles(const ResultTable& results) {
+  std::vector<std::string> titles = configuration_titles(results);
+  std::map<std::string, std::size_t> counts;
+  for (std::size_t i = 0; i < titles.size(); ++i) {
+    const std::string seed = results.table.text(i, "seed");
+    if (!seed.empty()) titles[i] += (titles[i].empty() ? "seed " : ", seed ") + seed;
+    ++counts[titles[i]];
+  }
+  for (std::size_t i = 0; i < titles.size(); ++i) {
+    if (!titles[i].empty() && counts[titles[i]] == 1) continue;
+    titles[i] += (titles[i].empty() ? "" : ", ") + results.folders[i].filename().string();
+  }
+  return titles;
+}
+
+std::string run_title(const ResultTable& results, std::size_t row) {
+  return run_titles(results)[row];
 }
 
 std::string title_in_sweep(const std::filesystem::path& run_folder) {

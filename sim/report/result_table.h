@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "report/table.h"
@@ -17,8 +18,16 @@ struct ResultTable {
   std::vector<std::filesystem::path> folders;  ///< of each row
 };
 
-/// What tells a run from the others: the values of the keys that vary, and its seed.
+/// What tells each run from the others: the values of the keys that vary, and its seed. Where
+/// that does not tell two apart, their folders do.
+std::vector<std::string> run_titles(const ResultTable& results);
 std::string run_title(const ResultTable& results, std::size_t row);
+
+/// The same without the seed: runs of one configuration have one title.
+std::vector<std::string> configuration_titles(const ResultTable& results);
+
+/// Every key of a run's resolved.yaml with its value; nothing without that file.
+std::vector<std::pair<std::string, std::string>> resolved_keys(const std::filesystem::path& run);
 
 /// The same of a run folder inside a sweep that has ended; empty for any other folder.
 std::string title_in_sweep(const std::filesystem::path& run_folder);

@@ -21,15 +21,15 @@ bool next_number(std::string_view& line, double& value) {
   return true;
 }
 
-bool parse_pose(std::string_view line, StampedPose& pose) {
+bool parse_pose(std::string_view line, TimedPose& pose) {
   Quat q;
-  Vec3& p = pose.X_OB.p;
+  Vec3& p = pose.X.p;
   const bool whole = next_number(line, pose.time_s) && next_number(line, p.x()) &&
                      next_number(line, p.y()) && next_number(line, p.z()) &&
                      next_number(line, q.x()) && next_number(line, q.y()) &&
                      next_number(line, q.z()) && next_number(line, q.w());
   if (!whole || q.norm() < 0.5) return false;
-  pose.X_OB.R = q.normalized().toRotationMatrix();
+  pose.X.R = q.normalized().toRotationMatrix();
   return true;
 }
 
@@ -84,8 +84,8 @@ double yaml_number(const std::string& text, const std::string& key, std::size_t 
 
 }  // namespace
 
-std::vector<StampedPose> read_tum(const std::filesystem::path& file) {
-  std::vector<StampedPose> poses;
+std::vector<TimedPose> read_tum(const std::filesystem::path& file) {
+  std::vector<TimedPose> poses;
   const auto bytes = read_bytes(file);
   if (!bytes) return poses;
   const std::string_view text = *bytes;
@@ -94,7 +94,7 @@ std::vector<StampedPose> read_tum(const std::filesystem::path& file) {
     if (end == std::string_view::npos) break;  // cut short
     const std::string_view line = text.substr(begin, end - begin);
     begin = end + 1;
-    StampedPose pose;
+    TimedPose pose;
     if (!line.empty() && line.front() != '#' && parse_pose(line, pose)) poses.push_back(pose);
   }
   return poses;

@@ -7,20 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "math/pose.h"
+#include "evaluation/timed_pose.h"
 #include "report/table.h"
 
 /// Reading run folders back. A killed run leaves some files short and others out: what is there is
 /// read, what is not is named.
 namespace arex::sim {
 
-struct StampedPose {
-  double time_s = 0;
-  Pose X_OB;
-};
-
 /// A TUM file. A last line cut short by a kill is left out; empty if the file is missing.
-std::vector<StampedPose> read_tum(const std::filesystem::path& file);
+std::vector<TimedPose> read_tum(const std::filesystem::path& file);
 
 /// A cloud in the order of first sight, thinned evenly along that order.
 struct RecordedCloud {
@@ -47,8 +42,8 @@ struct RunRecord {
   std::string title;  ///< what tells it from the other runs of its sweep; may be empty
   std::optional<nlohmann::ordered_json> summary;  ///< nothing: the run is unfinished
   std::string resolved_yaml;
-  std::vector<StampedPose> truth;     ///< X_OB, 200 Hz
-  std::vector<StampedPose> estimate;  ///< X_OB, 200 Hz
+  std::vector<TimedPose> truth;     ///< X_OB, 200 Hz
+  std::vector<TimedPose> estimate;  ///< X_OB, 200 Hz
   Table events;
   Table flight;
   Table coverage;

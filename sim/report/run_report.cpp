@@ -31,6 +31,8 @@ class Summary {
     if (!value || value->is_null()) return {};
     return value->is_string() ? value->get<std::string>() : value->dump();
   }
+  /// Every figure that it may hold.
+  [[nodiscard]] std::vector<FigureInfo> figures() const { return figures_in(json_); }
   /// A figure as people read it; empty if it has no value.
   [[nodiscard]] std::string shown(const FigureInfo& figure) const {
     const ordered_json* value = find(figure.key);
@@ -42,7 +44,7 @@ class Summary {
 
  private:
   static std::string with_unit(const std::string& number, const std::string& unit) {
-    return unit.empty() ? number : number + " " + unit;
+    return unit.empty() ? number : number + " " + unit_text(unit);
   }
   static std::string number_with_unit(double value, const std::string& unit) {
     if (unit == "1") return percent_text(value);
@@ -63,10 +65,11 @@ class Summary {
 
 std::vector<KeyFigure> key_figures(const Summary& summary) {
   std::vector<KeyFigure> figures;
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : summary.figures()) {
     const bool in_heading = figure.key == "outcome" || figure.key == "reason";
     if (!figure.main || in_heading) continue;
-    const std::string value = summary.shown(figure);
+    std::string value = summary.shown(figure);
+    if (figure.kind == FigureInfo::Kind::kText) value = words(value);
     if (!value.empty()) figures.push_back({figure.label, value, ""});
   }
   return figures;
@@ -78,7 +81,7 @@ std::string every_figure_html(const Summary& summary) {
       "<table class=\"data\">\n<thead><tr><th class=\"word\">figure</th><th>value</th>"
       "<th class=\"word\">in summary.json</th><th class=\"text\">meaning</th></tr></thead>\n"
       "<tbody>\n";
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : summary.figures()) {
     const std::string value = summary.shown(figure);
     html += "<tr><td class=\"word\">" + escape_markup(figure.label) + "</td><td>" +
             (value.empty() ? "–" : escape_markup(value)) + "</td><td class=\"word\"><code>" +
@@ -96,7 +99,9 @@ std::string name_of(const RunRecord& run) {
     return folder.has_filename() ? folder.filename().string()
                                  : folder.parent_path().filename().string();
   }
-  return scenario + (run.title.empty() ? ", seed " + summary.text("seed") : ": " + run.title);
+  // A title begins with the scenario where that was varied.
+  if (run.title.starts_with(scenario + ",") || run.title == scenario) return run.title;
+  return scenario + ", " + (run.title.empty() ? "seed " + summary.text("seed") : run.title);
 }
 
 std::string header_html(const RunRecord& run) {
@@ -104,7 +109,8 @@ std::string header_html(const RunRecord& run) {
   const std::string outcome = run.summary ? summary.text("outcome") : "unfinished";
   const std::string name = name_of(run);
   std::string html = "<h1>" + escape_markup(name) + " <span class=\"badge " +
-                     escape_markup(outcome) + "\">" + escape_markup(outcome) + "</span></h1>\n";
+                     escape_markup(outcome) + "\">" + escape_markup(words(outcome)) +
+                     "</span></h1>\n";
   if (!run.summary) {
     html +=
         "<p class=\"notice\">This run is unfinished: the folder has no summary.json. "
@@ -288,7 +294,7 @@ std::string run_report_html(const RunRecord& run) {
   html += "<section id=\"replay\"></section>\n";
   html += map_html(run);
   html += semantics_html(run);
-  html += "<section>\n<h2>Against time</h2>\n<div id=\"charts\"></div>\n</section>\n";
+  html += "<section id=\"against-time\"></section>\n";
   html +=
       "<div class=\"columns\">\n" + timing_html(run.timing) + events_html(run.events) + "</div>\n";
   html += decisions_html(run.decisions);

@@ -77,7 +77,7 @@ ordered_json coverage_json(const Table& coverage) {
   return json;
 }
 
-ordered_json track_json(const std::vector<StampedPose>& poses) {
+ordered_json track_json(const std::vector<TimedPose>& poses) {
   if (poses.empty()) return nullptr;
   std::vector<double> t, x, y, z, yaw;
   const double span = poses.back().time_s - poses.front().time_s;
@@ -87,10 +87,10 @@ ordered_json track_json(const std::vector<StampedPose>& poses) {
     if (poses[i].time_s < next - 1e-6 && i + 1 != poses.size()) continue;
     next = poses[i].time_s + period;
     t.push_back(poses[i].time_s);
-    x.push_back(poses[i].X_OB.p.x());
-    y.push_back(poses[i].X_OB.p.y());
-    z.push_back(poses[i].X_OB.p.z());
-    yaw.push_back(so3::yaw(poses[i].X_OB.R));
+    x.push_back(poses[i].X.p.x());
+    y.push_back(poses[i].X.p.y());
+    z.push_back(poses[i].X.p.z());
+    yaw.push_back(so3::yaw(poses[i].X.R));
   }
   return {{"t", quantised(t)},
           {"x", quantised(x)},

@@ -28,6 +28,13 @@ constexpr std::array kMovedKeys{
              "caution.degenerate_speed_fraction, of planning.local.max_speed_mps"},
     MovedKey{"mapping.global.sensor", "mapping.sensor"},
     MovedKey{"vehicle.own_returns_m", "vehicle.own_returns_margin_m, beyond vehicle.radius_m"},
+    MovedKey{"odometry.lidar_inertial.health.noticed_surprise",
+             "odometry.lidar_inertial.health.noticed_innovation"},
+    MovedKey{"odometry.lidar_inertial.health.doubtful_surprise",
+             "odometry.lidar_inertial.health.doubtful_innovation"},
+    MovedKey{"devices.lidar", "lidar.enabled"},
+    MovedKey{"devices.lidar_latency_s", "lidar.latency_s"},
+    MovedKey{"devices.depth_latency_s", "depth.latency_s"},
     MovedKey{"world.vehicle_radius_m", "nothing: the radius is the model's (models/arex/arex.xml)"},
 };
 
@@ -48,7 +55,7 @@ void refuse_moved_keys(const ConfigNode& scenario) {
     const ConfigNode::Entry* entry = entry_at(scenario, moved.old_key);
     if (!entry) continue;
     throw ConfigError(entry->where + ": '" + std::string(moved.old_key) +
-                      "' has no value of its own any more; set " + std::string(moved.instead));
+                      "' is not set here any more; set " + std::string(moved.instead));
   }
 }
 

@@ -1,8 +1,9 @@
 #include "run/recorder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -18,18 +19,19 @@
 namespace arex::sim {
 namespace {
 
-/// A line as printf formats it. Lines of numbers only: none is longer than the buffer.
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  std::array<char, 512> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
+const std::string kTumHeader = "# time_s x_m y_m z_m qx qy qz qw ";
 
 std::string tum_row(Stamp stamp, const Pose& X) {
   const Quat q = X.quaternion();
-  return line("%.9f %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n", to_seconds(stamp), X.p.x(), X.p.y(),
-              X.p.z(), q.x(), q.y(), q.z(), q.w());
+  return fmt::format("{:.9f} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n", to_seconds(stamp),
+                     X.p.x(), X.p.y(), X.p.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+/// Whether a TUM file is one that a run has written, whatever its odometry source was called.
+bool has_run_header(const std::filesystem::path& file) {
+  std::string beginning(kTumHeader.size(), '\0');
+  std::ifstream(file).read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  return beginning == kTumHeader;
 }
 
 // What an older run and a killed one have left: nothing of them may stand beside the new.
@@ -40,7 +42,9 @@ void remove_older_run(const std::filesystem::path& directory) {
     const bool ours = std::any_of(kRunFiles.begin(), kRunFiles.end(), [&](std::string_view file) {
       return name.starts_with(std::string(file) + ".") && name.ends_with(".partial");
     });
-    if (ours) drafts.push_back(entry.path());
+    if (ours || (name.ends_with(".tum") && has_run_header(entry.path()))) {
+      drafts.push_back(entry.path());
+    }
   }
   std::error_code none;
   for (const auto& draft : drafts) std::filesystem::remove(draft, none);
@@ -80,8 +84,8 @@ std::string terms_of(const Candidate& c) {
 Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_yaml)
     : directory_(made_folder(directory)),
       truth_((write_atomically(directory_ / "resolved.yaml", resolved_yaml),
-              open("truth.tum", "# time_s x_m y_m z_m qx qy qz qw (true X_OB)\n"))),
-      estimate_(open("estimate.tum", "# time_s x_m y_m z_m qx qy qz qw (estimated X_OB)\n")),
+              open("truth.tum", kTumHeader + "(true X_OB)\n"))),
+      estimate_(open("estimate.tum", kTumHeader + "(estimated X_OB)\n")),
       events_(open("events.csv", csv_header("events.csv"))),
       flight_(open("flight.csv", csv_header("flight.csv"))),
       decisions_(open("decisions.csv", csv_header("decisions.csv"))) {}
@@ -90,7 +94,7 @@ Recorder::~Recorder() {
   flush();  // of a flight that was left by an exception
 }
 
-GrowingFile Recorder::open(const char* name, const std::string& header) {
+GrowingFile Recorder::open(const std::string& name, const std::string& header) {
   GrowingFile file(directory_ / name);
   file.append(header);
   file.flush();
@@ -119,22 +123,32 @@ void Recorder::append(GrowingFile& file, std::string_view text) {
   if (file.is_open()) attempt([&] { file.append(text); });
 }
 
-void Recorder::truth(Stamp stamp, const Pose& X_OB) { append(truth_, tum_row(stamp, X_OB)); }
-
-void Recorder::estimate(Stamp stamp, const Pose& X_OB) { append(estimate_, tum_row(stamp, X_OB)); }
-
 void Recorder::event(const Event& event) {
-  append(events_, line("%.3f,", to_seconds(event.stamp)) +
+  append(events_, fmt::format("{:.3f},", to_seconds(event.stamp)) +
                       std::string(kEventKindNames[static_cast<std::size_t>(event.kind)]) + "," +
                       csv_quoted(event.detail) + "\n");
 }
 
-void Recorder::flight(const FlightRow& row) {
-  append(flight_,
-         line("%.3f,%.4f,%s,%.4f,%.5f,%s,%.4f,%.3f,%.1f,%.5f\n", to_seconds(row.stamp),
-              row.speed_mps, csv_number(row.tracking_error_m, 4).c_str(), row.odometry_error_m,
-              row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4).c_str(), row.height_m,
-              row.battery_voltage_v, row.battery_power_w, row.battery_fraction));
+void Recorder::sample(Stamp stamp, const FlightSample& sample) {
+  if (sample.truth_X_OB) append(truth_, tum_row(stamp, *sample.truth_X_OB));
+  if (sample.estimate_X_OB) append(estimate_, tum_row(stamp, *sample.estimate_X_OB));
+  for (const auto& [name, X_OB] : sample.others_X_OB) {
+    const auto [file, is_new] = others_.try_emplace(name);
+    if (is_new) {
+      attempt([&] {
+        file->second.emplace(open(name + ".tum", kTumHeader + "(X_OB as " + name + " has it)\n"));
+      });
+    }
+    if (file->second) append(*file->second, tum_row(stamp, X_OB));
+  }
+  if (!sample.row) return;
+  const FlightRow& row = *sample.row;
+  append(
+      flight_,
+      fmt::format("{:.3f},{:.4f},{},{:.4f},{:.5f},{},{:.4f},{:.3f},{:.1f},{:.5f}\n",
+                  to_seconds(row.stamp), row.speed_mps, csv_number(row.tracking_error_m, 4),
+                  row.odometry_error_m, row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4),
+                  row.height_m, row.battery_voltage_v, row.battery_power_w, row.battery_fraction));
 }
 
 void Recorder::decision(const Decision& decision) {
@@ -142,23 +156,27 @@ void Recorder::decision(const Decision& decision) {
     return std::string(names[static_cast<std::size_t>(value)]);
   };
   const std::string head = name(kDecisionKindNames, decision.kind) + "," +
-                           name(kCandidateSourceNames, decision.source) + "," +
+                           std::string(decision.source) + "," +
                            name(kTargetEndNames, decision.previous_end) + "," +
                            name(kStopReasonNames, decision.stop_reason);
   const std::string begin =
-      line("%.3f,%d,", to_seconds(decision.stamp), decision.sequence) + head + ",";
+      fmt::format("{:.3f},{},", to_seconds(decision.stamp), decision.sequence) + head + ",";
   if (decision.candidates.empty()) append(decisions_, begin + ",,,,,,,,,\n");
   for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
     const Candidate& c = decision.candidates[i];
     append(decisions_,
-           begin + line("%zu,%d,%.2f,%.2f,%s,%.3f,%s\n", i, decision.winner == i ? 1 : 0,
-                        c.point.x(), c.point.y(), name(kVerdictNames, c.verdict).c_str(),
-                        c.information_m2, terms_of(c).c_str()));
+           begin + fmt::format("{},{},{:.2f},{:.2f},{},{:.3f},{}\n", i,
+                               decision.winner == i ? 1 : 0, c.point.x(), c.point.y(),
+                               name(kVerdictNames, c.verdict), c.information_m2, terms_of(c)));
   }
 }
 
 void Recorder::flush() {
-  for (GrowingFile* file : {&decisions_, &truth_, &estimate_, &events_, &flight_}) {
+  std::vector<GrowingFile*> files{&decisions_, &truth_, &estimate_, &events_, &flight_};
+  for (auto& [name, file] : others_) {
+    if (file) files.push_back(&*file);
+  }
+  for (GrowingFile* file : files) {
     if (file->is_open()) attempt([&] { file->flush(); });
   }
 }
@@ -168,7 +186,7 @@ void Recorder::write_cloud(const std::vector<Vec3f>& points_O,
   attempt([&] { write_pcd(directory_ / "cloud.pcd", points_O); });
   std::string csv = csv_header("cloud_growth.csv");
   for (const CloudGrowth& row : growth) {
-    csv += line("%.3f,%zu\n", to_seconds(row.stamp), row.points);
+    csv += fmt::format("{:.3f},{}\n", to_seconds(row.stamp), row.points);
   }
   write_file("cloud_growth.csv", csv);
 }

@@ -4,8 +4,10 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "mapping/mapper.h"
 #include "math/pose.h"
 #include "messages/events.h"
+#include "scoring/flight_scorer.h"
 #include "semantics/semantic_map.h"
 
 namespace arex::sim {
@@ -27,20 +30,6 @@ inline constexpr std::array<std::string_view, 22> kRunFiles{
     "report.html",  "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
     "semantic.pcd", "objects.csv",  "semantic.png",  "host.json",          "output.txt",
     "failure.json", "resolved.yaml"};
-
-/// One row of flight.csv: what a report plots against time. Not a number: an empty cell.
-struct FlightRow {
-  Stamp stamp = 0;
-  double speed_mps = 0;         ///< true
-  double tracking_error_m = 0;  ///< true position against the setpoint
-  double odometry_error_m = 0;  ///< estimate against truth, aligned at the start
-  double odometry_yaw_error_rad = 0;
-  double clearance_m = 0;  ///< airframe to the nearest surface
-  double height_m = 0;     ///< true z in O
-  double battery_voltage_v = 0;
-  double battery_power_w = 0;
-  double battery_fraction = 1;  ///< state of charge
-};
 
 /// How many points the cloud had at a moment. Points are in the order of their first sight, so that
 /// the first `points` of cloud.pcd are the map of that moment.
@@ -60,10 +49,9 @@ class Recorder {
   Recorder(std::filesystem::path directory, const std::string& resolved_yaml);
   ~Recorder();
 
-  void truth(Stamp stamp, const Pose& X_OB);
-  void estimate(Stamp stamp, const Pose& X_OB);
   void event(const Event& event);
-  void flight(const FlightRow& row);
+  /// To truth.tum, estimate.tum and flight.csv; what further sources say to NAME.tum.
+  void sample(Stamp stamp, const FlightSample& sample);
   /// Every candidate of a decision with its terms, to decisions.csv.
   void decision(const Decision& decision);
   /// Makes what was recorded so far readable by others.
@@ -90,10 +78,12 @@ class Recorder {
   /// Does it, and remembers what the disk said against it.
   void attempt(const std::function<void()>& write);
   void append(GrowingFile& file, std::string_view text);
-  GrowingFile open(const char* name, const std::string& header);
+  GrowingFile open(const std::string& name, const std::string& header);
 
   std::filesystem::path directory_;
   GrowingFile truth_, estimate_, events_, flight_, decisions_;
+  std::map<std::string, std::optional<GrowingFile>>
+      others_;  ///< NAME.tum of further odometry sources
   std::vector<std::string> failures_;
   std::atomic<bool> failed_ = false;
   mutable std::mutex mutex_;  ///< of failures_: the cloud is written in a job

@@ -87,6 +87,7 @@ bool number_holds(const ordered_json& field, const Requirement& requirement) {
 }
 
 const FigureInfo& figure_of(const Requirement& requirement, const std::string& where) {
+  if (const FigureInfo* figure = find_figure(requirement.key)) return *figure;
   std::vector<std::string> known;
   for (const FigureInfo& figure : figure_list()) known.push_back(figure.column());
   ConfigNode node;

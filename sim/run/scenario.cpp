@@ -1,11 +1,12 @@
 #include "run/scenario.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
+#include "config/registry.h"
 #include "run/moved_keys.h"
 
 namespace arex::sim {
@@ -24,16 +25,13 @@ std::string fault_of(const Vec3& p_O, const worlds::World& world) {
   const Vec3 p_W = start_pose(world) * p_O;
   const Vec2 beyond =
       (p_W - world.bounds.high).head<2>().cwiseMax((world.bounds.low - p_W).head<2>());
-  std::array<char, 96> text{};
   if (beyond.maxCoeff() > 0) {
-    std::snprintf(text.data(), text.size(), "lies %.2f m outside the world", beyond.maxCoeff());
-    return text.data();
+    return fmt::format("lies {:.2f} m outside the world", beyond.maxCoeff());
   }
   const bool has_terrain = world.terrain.columns > 0;
   const double ground = has_terrain ? world.terrain.at(p_W.x(), p_W.y()) : world.bounds.low.z();
   if (p_W.z() >= ground) return {};
-  std::snprintf(text.data(), text.size(), "lies %.2f m below the ground", ground - p_W.z());
-  return text.data();
+  return fmt::format("lies {:.2f} m below the ground", ground - p_W.z());
 }
 
 void check_points(const Scenario& scenario, const worlds::World& world, const std::string& list,
@@ -73,17 +71,73 @@ bool has_room_to_explore_from(const worlds::World& world, const ScoredRegion& re
   return true;
 }
 
+/// What `build` gives; what it refuses is said with the place where the world was given.
+auto at_world(const ConfigNode& source, const auto& build) {
+  try {
+    return build();
+  } catch (const ConfigError& error) {
+    const ConfigNode* node = source.find("world");
+    throw ConfigError(last_given(node ? *node : source) + ": " + error.what());
+  }
+}
+
+/// An absolute name for what `node` names.
+std::string resolved_path(const ConfigNode& node, const std::string& path) {
+  const bool from_command_line = node.where.starts_with("--");
+  const std::filesystem::path file = node.where.substr(0, node.where.rfind(':'));
+  const std::filesystem::path folder =
+      from_command_line ? std::filesystem::path() : file.parent_path();
+  return std::filesystem::absolute(folder / path).lexically_normal().string();
+}
+
 }  // namespace
+
+void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world) {
+  if (world.kind != worlds::WorldKind::kFile) return;
+  const ConfigNode* file = node.find("file");
+  if (file == nullptr) return;
+  if (const ConfigNode* path = file->find("path")) {
+    world.file.path = resolved_path(*path, world.file.path);
+  }
+  const ConfigNode* folders = file->find("model_paths");
+  for (std::size_t i = 0; folders && i < folders->items.size(); ++i) {
+    std::string& folder = world.file.model_paths[i];
+    folder = resolved_path(folders->items[i], folder);
+  }
+}
+
+double ScenarioConfig::mapped_frames_hz() const {
+  double frames = lidar.enabled ? lidar.model.rate_hz : 0;
+  const auto depth_frames = [&](const DepthConfig& camera) {
+    return stack.mapping.local.use_depth
+               ? std::min<double>(camera.model.rate_hz, stack.mapping.depth_rate_hz)
+               : 0;
+  };
+  frames += depth_frames(depth);
+  for (const auto& [name, device] : devices) {
+    if (device.type == "mid360") frames += read_over(lidar, device.own).model.rate_hz;
+    if (device.type == "d430") frames += depth_frames(read_over(depth, device.own));
+  }
+  return frames;
+}
 
 std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
 
+std::shared_ptr<const worlds::FileWorld> Scenario::read_file_world() const {
+  if (file_world) return file_world;
+  return std::make_shared<worlds::FileWorld>(at_world(source, [&] {
+    return worlds::load_file_world(config.world.file, load_airframe().radius_m);
+  }));
+}
+
 worlds::World Scenario::build_world() const {
   worlds::World world;
-  try {
-    world = worlds::build_world(config.world, config.seed, load_airframe().radius_m);
-  } catch (const ConfigError& error) {
-    const ConfigNode* node = source.find("world");
-    throw ConfigError(given_last(node ? *node : source) + ": " + error.what());
+  if (file_world) {
+    world = file_world->world;
+  } else {
+    world = at_world(source, [&] {
+      return worlds::build_world(config.world, config.seed, load_airframe().radius_m);
+    });
   }
   check_way(*this, world);
   const bool explores = config.stack.mission.kind == MissionConfig::Kind::kExplore;
@@ -110,7 +164,7 @@ Pose start_pose(const worlds::World& world) {
 namespace {
 
 // What a pilot would read off the battery's label. A scenario may say otherwise.
-void tell_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
+void set_believed_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
   believed.full_v = battery.cells * battery.cell_full_v;
   believed.middle_v = battery.cells * battery.cell_middle_v;
   believed.empty_v = battery.cells * battery.cell_empty_v;
@@ -124,15 +178,21 @@ void tell_battery(const BatteryConfig& battery, ConsumptionConfig& believed) {
 /// Fills in, before the scenario's own words are read again over it, what follows from them where
 /// they say nothing: exploration bounds that end where the world does, the mapped box around them,
 /// the scores of that region as the map sees it, and what the stack knows of its battery.
-void derive(ScenarioConfig asked, ScenarioConfig& config) {
+/// A file's world is explored as far as a vehicle gets.
+void derive(ScenarioConfig asked, const worlds::FileWorld* file_world, ScenarioConfig& config) {
   if (asked.stack.mission.kind == MissionConfig::Kind::kExplore) {
     ExplorationBounds& bounds = asked.stack.exploration.explorer.bounds;
-    const Eigen::AlignedBox2d world = worlds::extent_of(asked.world);
-    bounds.low_m = bounds.low_m.cwiseMax(world.min());
-    bounds.high_m = bounds.high_m.cwiseMin(world.max());
+    if (file_world != nullptr) {
+      const Eigen::AlignedBox2d reachable = worlds::extent_of(*file_world);
+      bounds.low_m = reachable.min();
+      bounds.high_m = reachable.max();
+    } else if (const auto world = worlds::extent_of(asked.world)) {
+      bounds.low_m = bounds.low_m.cwiseMax(world->min());
+      bounds.high_m = bounds.high_m.cwiseMin(world->max());
+    }
     config.stack.exploration.explorer.bounds = bounds;
   }
-  tell_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
+  set_believed_battery(asked.physics.battery, config.stack.exploration.explorer.consumption);
   set_mapped_box(asked.stack, config.stack.mapping.global);
   const GlobalMapConfig& map = asked.stack.mapping.global;
   config.scoring.low_m = std::max(config.scoring.low_m, map.low_m.z());
@@ -142,6 +202,9 @@ void derive(ScenarioConfig asked, ScenarioConfig& config) {
   coverage.band_low_m = map.band_low_m;
   coverage.band_high_m = map.band_high_m;
   coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;
+  for (const auto& [name, device] : asked.devices) {
+    config.stack.vehicle.mounts[name] = device.mount;
+  }
 }
 
 /// The rule by which the explored region leaves the world; empty: none. Beyond the world's edge
@@ -149,14 +212,14 @@ void derive(ScenarioConfig asked, ScenarioConfig& config) {
 std::string broken_world_rule(const ScenarioConfig& config) {
   if (config.stack.mission.kind != MissionConfig::Kind::kExplore) return "";
   const Vec2 rounding = Vec2::Constant(1e-6);
-  const Eigen::AlignedBox2d world = worlds::extent_of(config.world);
+  const auto known = worlds::extent_of(config.world);
+  if (!known) return "";  // nothing to see is beyond the edge of what was surveyed
+  const Eigen::AlignedBox2d world = *known;
   const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
   if (about.contains(config.stack.exploration.explorer.bounds.extent())) return "";
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(),
-                "exploration.bounds within the world, which reaches from [%g, %g] to [%g, %g]",
-                world.min().x(), world.min().y(), world.max().x(), world.max().y());
-  return text.data();
+  return fmt::format(
+      "exploration.bounds within the world, which reaches from [{:g}, {:g}] to [{:g}, {:g}]",
+      world.min().x(), world.min().y(), world.max().x(), world.max().y());
 }
 
 /// The first rule that world, explored region, map and scores break together; empty: none.
@@ -170,6 +233,21 @@ std::string broken_region_rule(const ScenarioConfig& config) {
   return mapped ? "" : "scoring.low_m, scoring.high_m within the heights of mapping.global";
 }
 
+/// Whether the exploration's bounds follow from a file that has to be read first.
+bool needs_file_to_bound(const ConfigNode& source, const ScenarioConfig& asked) {
+  if (asked.world.kind != worlds::WorldKind::kFile) return false;
+  if (asked.stack.mission.kind != MissionConfig::Kind::kExplore) return false;
+  const ConfigNode* exploration = source.find("exploration");
+  const ConfigNode* bounds = exploration ? exploration->find("bounds") : nullptr;
+  return bounds == nullptr || !bounds->find("low_m") || !bounds->find("high_m");
+}
+
+void resolve_world(Scenario& scenario) {
+  if (const ConfigNode* world = scenario.source.find("world")) {
+    resolve_paths(*world, scenario.config.world);
+  }
+}
+
 }  // namespace
 
 Scenario make_scenario(const std::string& name, ConfigNode source) {
@@ -177,10 +255,18 @@ Scenario make_scenario(const std::string& name, ConfigNode source) {
   scenario.name = name;
   scenario.source = std::move(source);
   refuse_moved_keys(scenario.source);
+  load_plugins(scenario.source);
   ScenarioConfig asked;
   read_config(scenario.source, asked);
-  derive(std::move(asked), scenario.config);
+  if (needs_file_to_bound(scenario.source, asked)) {
+    scenario.config.world = asked.world;
+    resolve_world(scenario);
+    scenario.file_world = scenario.read_file_world();
+  }
+  derive(std::move(asked), scenario.file_world.get(), scenario.config);
   read_config(scenario.source, scenario.config);
+  check_modules(scenario.config.stack, scenario.source);
+  resolve_world(scenario);
   if (const std::string rule = broken_region_rule(scenario.config); !rule.empty()) {
     config_detail::fail(config_detail::locate_rule(scenario.source, rule),
                         "out of range: expected " + rule);

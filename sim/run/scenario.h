@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,34 +12,19 @@
 #include "config/config.h"
 #include "physics/airframe.h"
 #include "physics/physics_config.h"
+#include "run/device_section.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
 #include "scoring/semantic_score.h"
 #include "scoring/thin_branches.h"
+#include "semantics/pcl_models.h"
 #include "semantics/semantic_config.h"
-#include "sensors/d430.h"
 #include "sensors/imu.h"
-#include "sensors/mid360.h"
+#include "sensors/mocap_device.h"
 #include "stack/stack.h"
 #include "worlds/recipes.h"
 
 namespace arex::sim {
-
-/// Which devices run, and how long they take from measurement to delivery. The depth camera runs
-/// when the stack reads it (mapping.use_depth).
-struct DeviceConfig {
-  bool lidar = true;
-  double lidar_latency_s = 0.003;  ///< network and driver, after the frame's last firing (estimate)
-  double depth_latency_s = 0.030;  ///< exposure to driver: one frame at 30 Hz (estimate)
-
-  void fields(auto& f) {
-    f("lidar", lidar, "fire the LiDAR");
-    f("lidar_latency_s", lidar_latency_s, "end of a LiDAR frame to its delivery");
-    f("depth_latency_s", depth_latency_s, "exposure of a depth frame to its delivery");
-    f.check(lidar_latency_s >= 0 && lidar_latency_s <= 60, "0 <= lidar_latency_s <= 60");
-    f.check(depth_latency_s >= 0 && depth_latency_s <= 60, "0 <= depth_latency_s <= 60");
-  }
-};
 
 /// What the truth is compared with. Coverage is scored on explorations only.
 struct ScoringConfig {
@@ -61,11 +48,14 @@ struct ScoringConfig {
 
 /// The semantic map that an exploration ends with.
 struct MissionSemanticsConfig {
-  bool enabled = true;
+  bool enabled = false;
   SemanticConfig map;
 
   void fields(auto& f) {
-    f("enabled", enabled, "explorations end with a semantic map of their cloud");
+    f("enabled", enabled,
+      "explorations end with a semantic map of their cloud, scored against the world; `arex "
+      "semantics RUN` makes it afterwards");
+    f.check(!enabled || has_pcl(), "enabled false, for this build has no PCL");
     map.fields(f);
   }
 };
@@ -77,9 +67,10 @@ struct ScenarioConfig {
   worlds::WorldConfig world;
   PhysicsConfig physics;
   ImuConfig imu;
-  Mid360Config lidar;
-  D430Config depth;
-  DeviceConfig devices;
+  LidarConfig lidar;
+  DepthConfig depth;
+  MocapConfig mocap;
+  std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
   StackConfig stack;
   MissionSemanticsConfig semantics;
@@ -92,25 +83,30 @@ struct ScenarioConfig {
     f("imu", imu, "the autopilot's sensors");
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
-    f("devices", devices, "which run, and how long they take");
+    f("mocap", mocap, "motion capture, where odometry.source is that");
+    f("devices", devices,
+      "further ones by name: {type: mid360|spinning|d430, position_m: [..], rotation_rad: [..], "
+      "...}");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
     f("semantics", semantics, "what the mapped cloud shows");
     f("scoring", scoring, "what the truth is compared with");
-    f.check(devices.lidar || stack.odometry.source == OdometryConfig::Source::kMocap,
-            "devices.lidar true, or odometry.source mocap");
+    f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
+                !devices.contains("mocap"),
+            "devices with other names than imu, lidar, depth and mocap, which the first ones have");
+    f.check(lidar.enabled || stack.odometry.source == "mocap",
+            "lidar.enabled true, or odometry.source mocap");
     // Software that takes longer than the time between two frames falls ever further behind.
-    const double scans_hz = devices.lidar ? lidar.rate_hz : 0;
-    const double frames_hz = stack.mapping.local.use_depth
-                                 ? std::min<double>(depth.rate_hz, stack.mapping.depth_rate_hz)
-                                 : 0;
-    f.check(stack.odometry.source == OdometryConfig::Source::kMocap ||
-                scans_hz * stack.odometry.latency_s <= 1,
+    f.check(!stack.uses_odometry("lidar_inertial") ||
+                lidar.enabled * lidar.model.rate_hz * stack.odometry.latency_s <= 1,
             "odometry.latency_s <= 1 / lidar.rate_hz");
-    f.check(!stack.mapping.enabled || (scans_hz + frames_hz) * stack.mapping.latency_s <= 1,
+    f.check(!stack.mapping.enabled || mapped_frames_hz() * stack.mapping.latency_s <= 1,
             "mapping.latency_s <= 1 / (lidar.rate_hz + lesser of depth.rate_hz, "
-            "mapping.depth_rate_hz)");
+            "mapping.depth_rate_hz), further devices counted");
   }
+
+  /// Frames that the maps take, of all devices.
+  [[nodiscard]] double mapped_frames_hz() const;
 };
 
 /// A scenario as it was asked for.
@@ -118,6 +114,8 @@ struct Scenario {
   std::string name;  ///< the file's name without its ending
   ScenarioConfig config;
   ConfigNode source;  ///< what the file and the overrides say, for messages
+  /// The world of kind file, where something had to be known of it to read the scenario.
+  std::shared_ptr<const worlds::FileWorld> file_world;
 
   /// Every value; running it again gives the same trajectory hash.
   [[nodiscard]] std::string resolved_yaml() const;
@@ -125,12 +123,19 @@ struct Scenario {
   /// of a point which the mission flies to if that lies off the world or below its ground, and of
   /// `mission` if the vehicle has no room where it is to explore from.
   [[nodiscard]] worlds::World build_world() const;
+  /// The world of kind file as it was understood. @throws ConfigError at the line of `world`.
+  [[nodiscard]] std::shared_ptr<const worlds::FileWorld> read_file_world() const;
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;
 };
 
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.
 Pose start_pose(const worlds::World& world);
+
+/// Names of files in a `world` section become absolute. They are relative to the file that says so,
+/// on the command line to the working directory.
+/// @param node what was said of the section
+void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world);
 
 /// The scenario that `source` asks for, checked, with what follows from it (such as the battery
 /// that the stack believes in). Whatever runs, sweeps, prints or checks a scenario has it from

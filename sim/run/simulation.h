@@ -1,22 +1,25 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "autopilot/autopilot.h"
+#include "jobs/job_queue.h"
+#include "math/fingerprint.h"
 #include "physics/physics.h"
-#include "run/bag_writer.h"
-#include "run/flight_scorer.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
 #include "run/stage_timer.h"
-#include "run/trajectory_hash.h"
+#include "scoring/flight_scorer.h"
 #include "scoring/map_error.h"
+#include "sensors/device.h"
 #include "scoring/semantic_score.h"
 #include "sensors/scene.h"
-#include "stack/job_queue.h"
+#include "stack/flight_software.h"
 
 namespace arex::sim {
 
@@ -41,14 +44,6 @@ struct ExplorationLog {
   void add_figures(Figures& figures) const;
 };
 
-/// What each device delivered, as fingerprints: where two hosts differ, the first to differ tells.
-struct DeviceHashes {
-  std::string lidar;
-  std::string depth;
-  std::string
-      imu;  ///< all that the autopilot's board measures: IMU, magnetometer, barometer, power
-};
-
 /// What a flight amounts to; summary.json comes from it.
 struct FlightResult {
   Outcome outcome = Outcome::kFlying;
@@ -56,7 +51,8 @@ struct FlightResult {
   Stamp duration = 0;
   std::string trajectory_hash;  ///< of the true state at every tick and every command
   std::string sensor_hash;      ///< of every scan and frame delivered
-  DeviceHashes device_hashes;
+  /// What each device delivered: where two hosts differ, the first to differ tells.
+  std::map<std::string, std::string> device_hashes;
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;
@@ -64,8 +60,7 @@ struct FlightResult {
   std::optional<CoverageResult> coverage;  ///< of explorations
   std::optional<SemanticScore> semantic;   ///< of explorations that make a semantic map
   ExplorationLog exploration;
-  int plans = 0;
-  int plan_failures = 0;
+  PlanCounts plans;
   BatteryState battery;
   std::string renderer;  ///< of the depth frames; empty if none was read
   std::vector<TimingRow> timing;
@@ -84,7 +79,7 @@ class Simulation {
   void record_to(Recorder& recorder) { recorder_ = &recorder; }
 
   /// Gives what the sensors deliver to a bag as well; it must outlive the flight.
-  void record_to(BagWriter& bag) { bag_ = &bag; }
+  void record_to(BagWriter& bag) { outlets_.bag = &bag; }
 
   /// Flies one millisecond. @return whether the flight goes on.
   bool tick();
@@ -95,24 +90,21 @@ class Simulation {
   [[nodiscard]] double area_fraction() const { return area_fraction_; }
   [[nodiscard]] Stamp now() const { return now_; }
   [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
-  [[nodiscard]] const Stack& stack() const { return stack_; }
+  [[nodiscard]] FlightView view() const { return stack_->view(); }
   // Of what was flown so far.
   [[nodiscard]] std::string trajectory_hash() const { return hash_.text(); }
-  [[nodiscard]] DeviceHashes device_hashes() const {
-    return {lidar_hash_.text(), depth_hash_.text(), imu_hash_.text()};
-  }
+  [[nodiscard]] std::map<std::string, std::string> device_hashes() const;
   /// Scores what was flown. Call it once, at the end.
   FlightResult finish();
 
  private:
-  void fire_imu();
-  void fire_lidar();
-  void fire_depth();
+  void add_devices();
+  void fire_devices();
   void run_stack();
   void run_autopilot();
   void step_physics();
   void record();
-  void judge();
+  void check_end();
   void end(Outcome outcome, const std::string& reason);
   void write_cloud();
   void note_cloud_growth();
@@ -120,9 +112,8 @@ class Simulation {
   [[nodiscard]] SemanticScore map_semantics(const std::vector<Vec3f>& cloud_O,
                                             const std::vector<PosePair>& poses) const;
 
-  struct LidarFrame;
   struct Timers {
-    StageTimer imu{"imu"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
+    StageTimer devices{"devices"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
         recording{"recording"}, semantics{"semantics"};
   };
 
@@ -130,24 +121,15 @@ class Simulation {
   worlds::World world_;
   Scene scene_;
   Physics physics_;
-  ImuModel imu_;
-  Mid360 lidar_;
-  std::unique_ptr<D430> camera_;  ///< made when the first frame is read; in jobs of its lane
   Autopilot autopilot_;
   Recorder* recorder_ = nullptr;
-  BagWriter* bag_ = nullptr;
 
   Stamp now_ = 0;
   Outcome outcome_ = Outcome::kFlying;
   std::string reason_;
   MotorCommand motors_;
   Truth previous_truth_;
-  std::vector<Truth> lidar_part_;            ///< ticks of the part being fired
-  std::shared_ptr<LidarFrame> lidar_frame_;  ///< the frame being fired
-  std::int64_t depth_frame_ = 0;             ///< index of the next frame
-
-  TrajectoryHash hash_;
-  TrajectoryHash sensor_hash_, lidar_hash_, depth_hash_, imu_hash_;
+  Fingerprint hash_;
   FlightScorer scorer_;
   std::unique_ptr<CoverageScorer> coverage_;  ///< in jobs of the cloud's lane
   std::vector<Vec3> path_W_;                  ///< flown since the last score
@@ -159,9 +141,9 @@ class Simulation {
   Timers timers_;
 
   JobQueue jobs_;
-  JobQueue::Lane lidar_lane_;
-  JobQueue::Lane depth_lane_;
-  Stack stack_;
+  Outlets outlets_;
+  std::vector<std::pair<std::string, std::unique_ptr<Device>>> devices_;  ///< fired in this order
+  std::unique_ptr<FlightSoftware> stack_;
 };
 
 }  // namespace arex::sim

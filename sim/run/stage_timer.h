@@ -46,7 +46,7 @@ struct TimingRow {
   double total_s = 0;
 };
 
-inline TimingRow summarise(const std::string& module, std::vector<float> seconds) {
+inline TimingRow timing_row(const std::string& module, std::vector<float> seconds) {
   TimingRow row;
   row.module = module;
   row.calls = seconds.size();

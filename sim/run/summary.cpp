@@ -1,9 +1,9 @@
 #include "run/summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #ifndef AREX_VERSION
@@ -43,16 +43,12 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
   figures.set("real_time_factor", sim_time / host.wall_s);
   figures.set("trajectory_hash", result.trajectory_hash);
   figures.set("sensor_hash", result.sensor_hash);
-  figures.set("device_hashes.lidar", result.device_hashes.lidar);
-  figures.set("device_hashes.imu", result.device_hashes.imu);
+  for (const auto& [name, hash] : result.device_hashes) figures.set("device_hashes." + name, hash);
   figures.set("targets", targets_of(result));
   figures.set("collisions", result.collisions);
   figures.set("battery.used_wh", result.battery.used_wh);
   figures.set("battery.remaining_fraction", result.battery.state_of_charge);
-  if (!result.renderer.empty()) {  // a frame was read
-    figures.set("device_hashes.depth", result.device_hashes.depth);
-    figures.set("renderer", result.renderer);
-  }
+  if (!result.renderer.empty()) figures.set("renderer", result.renderer);  // a frame was read
   figures.set("build.version", build_version());
   figures.set("build.compiler", build_compiler());
 }
@@ -61,17 +57,27 @@ void add_flight(const FlightScore& flight, Figures& figures) {
   figures.set("distance_m", flight.distance_m);
   figures.set("tracking.rmse_m", flight.tracking_rmse_m);
   figures.set("tracking.landing_error_m", flight.landing_error_m);
-  add_figures(flight.odometry, figures);
+  add_figures(flight.odometry, "odometry", figures);
   if (!flight.poses.empty()) figures.set("odometry.lost_s", flight.odometry_lost_s);
+  for (const auto& [name, source] : flight.others) {
+    add_figures(source.score, "odometries." + name, figures);
+    figures.set("odometries." + name + ".lost_s", source.lost_s);
+  }
   add_figures(flight.clearance, figures);
   if (flight.landing) add_figures(*flight.landing, figures);
   if (flight.thin) add_figures(*flight.thin, figures);
 }
 
 void add_planner(const FlightResult& result, Figures& figures) {
-  if (result.plans == 0) return;
-  figures.set("planner.replans", result.plans);
-  figures.set("planner.failures", result.plan_failures);
+  if (result.plans.plans == 0) return;
+  figures.set("planner.replans", result.plans.plans);
+  figures.set("planner.failures", result.plans.failures);
+  figures.set("planner.retimed", result.plans.retimed);
+  figures.set("planner.slowed", result.plans.slowed);
+  for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
+    figures.set("planner.stages." + std::string(kPlanStageNames[stage]),
+                result.plans.stages[stage]);
+  }
   for (const TimingRow& row : result.timing) {
     if (row.module != kPlannerModule) continue;
     figures.set("planner.median_ms", row.median_ms);
@@ -100,8 +106,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   add_run(scenario, result, host, figures);
   add_flight(result.flight, figures);
   add_planner(result, figures);
-  const auto source = scenario.config.stack.odometry.source;
-  figures.set("odometry.source", enum_names(source)[static_cast<std::size_t>(source)]);
+  figures.set("odometry.source", scenario.config.stack.odometry.source);
   if (result.map) add_figures(*result.map, figures);
   if (result.coverage) add_figures(*result.coverage, figures);
   if (result.semantic) add_figures(*result.semantic, figures);
@@ -137,10 +142,8 @@ std::string odometry_error_csv(const std::vector<PosePair>& poses) {
     const Pose aligned = X_WO * poses[i].X_OB;
     const Vec3 p = aligned.p - poses[i].X_WB.p;
     const Vec3 r = so3::Log(aligned.R * poses[i].X_WB.R.transpose());
-    std::array<char, 160> line{};
-    std::snprintf(line.data(), line.size(), "%.3f,%.5f,%.5f,%.5f,%.6f,%.6f,%.6f\n",
-                  to_seconds(poses[i].stamp), p.x(), p.y(), p.z(), r.x(), r.y(), r.z());
-    text += line.data();
+    text += fmt::format("{:.3f},{:.5f},{:.5f},{:.5f},{:.6f},{:.6f},{:.6f}\n",
+                        to_seconds(poses[i].stamp), p.x(), p.y(), p.z(), r.x(), r.y(), r.z());
   }
   return text;
 }

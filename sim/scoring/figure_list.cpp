@@ -1,3 +1,4 @@
+#include "planning/plan_status.h"
 #include "scoring/figures.h"
 #include "worlds/world.h"
 
@@ -33,6 +34,8 @@ std::vector<FigureInfo> run_figures() {
        "of its frames; null: no frame was read", Kind::kText},
       {"device_hashes.imu", "IMU's hash", "", kNeither, false,
        "of all that the autopilot's sensors delivered", Kind::kText},
+      {"device_hashes.NAME", "hash of a further device", "", kNeither, false,
+       "of its frames; NAME as under devices", Kind::kText},
       {"distance_m", "distance flown", "m", kLess, true, "length of the true path"},
       {"targets", "targets reached by the mission", "", kNeither, false,
        "places that the mission reached, the way home included, with the time of each",
@@ -77,8 +80,8 @@ std::vector<FigureInfo> exploration_figures() {
   return {
       {"exploration.decisions", "decisions of the explorer", "", kNeither, false,
        "of explorations; null if it was never asked"},
-      {"exploration.targets", "targets issued", "", kNeither, false,
-       "the same as targets_issued, its older name"},
+      {"exploration.targets", "targets issued (older name)", "", kNeither, false,
+       "the same as exploration.targets_issued"},
       {"exploration.targets_issued", "targets issued", "", kNeither, false,
        "by the explorer: decisions for a new one"},
       {"exploration.targets_seen", "targets seen on the way", "", kNeither, false,
@@ -112,36 +115,47 @@ std::vector<FigureInfo> map_figures() {
   };
 }
 
-std::vector<FigureInfo> odometry_figures() {
+std::vector<FigureInfo> odometry_source_figures() {
   return {
-      {"odometry.source", "odometry", "", kNeither, false, "the source that flew", Kind::kText},
-      {"odometry.ate_rmse_m", "odometry error, RMS", "m", kLess, true,
+      {"odometry.source", "odometry", "", kNeither, false, "the source that flew", Kind::kText}};
+}
+
+/// @param section of the summary, with a dot
+std::vector<FigureInfo> odometry_figures(const std::string& section, bool flies) {
+  return {
+      {section + "ate_rmse_m", "odometry error, RMS", "m", kLess, flies,
        "absolute position error, aligned at the first pose; null if there never was an "
        "estimate"},
-      {"odometry.ate_max_m", "odometry error, largest", "m", kLess, false, "of the same"},
-      {"odometry.ate_se3_rmse_m", "odometry error, RMS, best fit", "m", kLess, false,
+      {section + "ate_max_m", "odometry error, largest", "m", kLess, false, "of the same"},
+      {section + "ate_se3_rmse_m", "odometry error, RMS, best fit", "m", kLess, false,
        "after the best rigid alignment of the whole run"},
-      {"odometry.yaw_error_max_deg", "heading error, largest", "deg", kLess, false,
+      {section + "yaw_error_max_deg", "heading error, largest", "deg", kLess, false,
        "aligned at the first pose"},
-      {"odometry.start_tilt_deg", "tilt of the odometry's frame", "deg", kLess, false,
+      {section + "start_tilt_deg", "tilt of the odometry's frame", "deg", kLess, false,
        "between its z axis and the vertical, at the start"},
-      {"odometry.rpe_1m_m", "relative error over 1 m", "m", kLess, false,
+      {section + "rpe_1m_m", "relative error over 1 m", "m", kLess, false,
        "RMS over all parts of the path of that length; null if it is shorter"},
-      {"odometry.rpe_10m_m", "relative error over 10 m", "m", kLess, false,
+      {section + "rpe_10m_m", "relative error over 10 m", "m", kLess, false,
        "RMS over all parts of the path of that length; null if it is shorter"},
-      {"odometry.lost_s", "time without odometry", "s", kLess, false,
+      {section + "end_error_m", "odometry error at the end", "m", kLess, false,
+       "of the last position, aligned at the first pose"},
+      {section + "drift_percent", "odometry drift", "%", kLess, false,
+       "the error at the end, of the path's length; null without a path"},
+      {section + "lost_s", "time without odometry", "s", kLess, false,
        "status lost; null if there never was an estimate"},
   };
 }
 
 std::vector<FigureInfo> flight_figures() {
-  return {
+  std::vector<FigureInfo> list{
       {"planner.replans", "plans", "", kNeither, false, "of missions that are planned"},
       {"planner.median_ms", "planning time, median", "ms", kNeither, false, "of the host",
        Kind::kNumber, true},
       {"planner.p99_ms", "planning time, 99th percentile", "ms", kNeither, false, "of the host",
        Kind::kNumber, true},
       {"planner.failures", "plans failed", "", kLess, true, "that found no way"},
+      {"planner.retimed", "plans timed anew", "", kNeither, false, "to hold the limits"},
+      {"planner.slowed", "plans slowed", "", kNeither, false, "for unknown space ahead"},
       {"tracking.rmse_m", "tracking error, RMS", "m", kLess, true,
        "true position against the setpoint from take-off until it begins to land; null if it "
        "never flew"},
@@ -175,6 +189,13 @@ std::vector<FigureInfo> flight_figures() {
       {"build.version", "build", "", kNeither, false, "version and commit", Kind::kText},
       {"build.compiler", "compiler", "", kNeither, false, "and its version", Kind::kText},
   };
+  for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
+    const std::string name(kPlanStageNames[stage]);
+    list.push_back(
+        {"planner.stages." + name, "plans: " + name, "", kNeither, false,
+         "that this rung of the planner's ladder made (autonomy/planning/plan_status.h)"});
+  }
+  return list;
 }
 
 // The classes of scoring/semantic_score.h.
@@ -360,7 +381,8 @@ std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
 const std::vector<FigureInfo>& figure_list() {
   static const auto list =
       joined<FigureInfo>({run_figures(), coverage_figures(), exploration_figures(), map_figures(),
-                          odometry_figures(), semantic_figures(), flight_figures()});
+                          odometry_source_figures(), odometry_figures("odometry.", true),
+                          odometry_figures("odometries.NAME.", false), semantic_figures(), flight_figures()});
   return list;
 }
 

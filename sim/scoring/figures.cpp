@@ -1,9 +1,9 @@
 #include "scoring/figures.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -41,9 +41,52 @@ const std::map<std::string, const FigureInfo*, std::less<>>& by_column() {
 
 std::string FigureInfo::column() const { return kind == Kind::kList ? key + ".count" : key; }
 
+bool FigureInfo::is_named() const { return key.find(kNamePart) != std::string::npos; }
+
+std::optional<std::string> FigureInfo::name_in(std::string_view column) const {
+  const std::size_t at = key.find(kNamePart);
+  if (at == std::string::npos || kind == Kind::kList) return std::nullopt;
+  const std::string_view before(key.data(), at);
+  const std::string_view after = std::string_view(key).substr(at + kNamePart.size());
+  if (column.size() <= before.size() + after.size() || !column.starts_with(before) ||
+      !column.ends_with(after)) {
+    return std::nullopt;
+  }
+  std::string name(column.substr(at, column.size() - before.size() - after.size()));
+  return name.find('.') == std::string::npos ? std::optional(name) : std::nullopt;
+}
+
+FigureInfo FigureInfo::named(std::string_view name) const {
+  FigureInfo figure = *this;
+  figure.key.replace(key.find(kNamePart), kNamePart.size(), name);
+  figure.label += ", " + std::string(name);
+  return figure;
+}
+
 const FigureInfo* find_figure(std::string_view column) {
   const auto found = by_column().find(column);
-  return found == by_column().end() ? nullptr : found->second;
+  if (found != by_column().end()) return found->second;
+  for (const FigureInfo& figure : figure_list()) {
+    if (figure.name_in(column)) return &figure;
+  }
+  return nullptr;
+}
+
+std::vector<FigureInfo> figures_in(const ordered_json& summary) {
+  std::vector<FigureInfo> figures;
+  for (const FigureInfo& figure : figure_list()) {
+    if (!figure.is_named()) {
+      figures.push_back(figure);
+      continue;
+    }
+    const auto section = summary.find(figure.key.substr(0, figure.key.find('.')));
+    if (section == summary.end() || !section->is_object()) continue;
+    for (const auto& [name, values] : section->items()) {
+      FigureInfo named = figure.named(name);
+      if (!by_column().contains(named.column())) figures.push_back(std::move(named));
+    }
+  }
+  return figures;
 }
 
 std::string csv_header(std::string_view file) {
@@ -59,9 +102,7 @@ std::string csv_header(std::string_view file) {
 
 std::string csv_number(double value, int decimals) {
   if (!std::isfinite(value)) return "";
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return text.data();
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 void Figures::set(std::string_view key, double value) { put(key, value); }
@@ -96,12 +137,22 @@ ordered_json Figures::json_of(const Value& value) {
 
 ordered_json Figures::json() const {
   ordered_json json = ordered_json::object();
-  for (const FigureInfo& figure : figure_list()) {
-    std::string pointer = "/" + figure.key;
+  const auto put = [&](const std::string& key, const ordered_json& value) {
+    std::string pointer = "/" + key;
     std::replace(pointer.begin(), pointer.end(), '.', '/');
+    json[ordered_json::json_pointer(pointer)] = value;
+  };
+  for (const FigureInfo& figure : figure_list()) {
+    if (figure.is_named()) {
+      for (const auto& [key, value] : values_) {
+        if (figure.name_in(key)) put(key, json_of(value));
+      }
+      const std::string section = figure.key.substr(0, figure.key.find('.'));
+      if (!json.contains(section)) json[section] = nullptr;
+      continue;
+    }
     const auto value = values_.find(figure.key);
-    json[ordered_json::json_pointer(pointer)] =
-        value == values_.end() ? ordered_json(nullptr) : json_of(value->second);
+    put(figure.key, value == values_.end() ? ordered_json(nullptr) : json_of(value->second));
   }
   for (auto& section : json) fold(section);
   return json;

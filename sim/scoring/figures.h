@@ -18,6 +18,9 @@ namespace arex::sim {
 /// Which way a figure is better, other things being equal.
 enum class Better : std::uint8_t { kNeither, kMore, kLess };
 
+/// Stands in a key for a name that the scenario gives: odometries.NAME.ate_rmse_m.
+inline constexpr std::string_view kNamePart = "NAME";
+
 struct FigureInfo {
   enum class Kind : std::uint8_t { kNumber, kText, kList };
 
@@ -32,10 +35,19 @@ struct FigureInfo {
 
   /// The name of its one cell in a table: a list counts by its length, `targets.count`.
   [[nodiscard]] std::string column() const;
+  /// Whether its key holds kNamePart.
+  [[nodiscard]] bool is_named() const;
+  /// The name that a column gives it; nothing if the column is none of its.
+  [[nodiscard]] std::optional<std::string> name_in(std::string_view column) const;
+  /// The figure with this name in its key.
+  [[nodiscard]] FigureInfo named(std::string_view name) const;
 };
 
 /// Every figure of summary.json in its order.
 const std::vector<FigureInfo>& figure_list();
+
+/// The same with each figure that is named once for every name that the summary gives it.
+std::vector<FigureInfo> figures_in(const nlohmann::ordered_json& summary);
 
 /// The figure of a table's column; null if there is none.
 const FigureInfo* find_figure(std::string_view column);

@@ -18,8 +18,7 @@ struct MapErrorConfig {
   int max_points = 200'000;
 
   void fields(auto& f) {
-    f("outlier_m", outlier_m,
-      "a map point further from every true surface is an outlier (issue 3)");
+    f("outlier_m", outlier_m, "a map point further from every true surface is an outlier");
     f("foliage_m", foliage_m, "a map point nearest to foliage, and this near, is left out");
     f("max_distance_m", max_distance_m, "distances are clamped to this");
     f("max_points", max_points, "a larger cloud is sampled down to this");

@@ -82,17 +82,25 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
       std::acos(std::clamp(X_WO_start.R(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
   score.rpe_1m_m = relative_error(pairs, 1.0);
   score.rpe_10m_m = relative_error(pairs, 10.0);
+  score.end_error_m = (X_WO_start * pairs.back().X_OB.p - pairs.back().X_WB.p).norm();
+  double path = 0;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    path += (pairs[i].X_WB.p - pairs[i - 1].X_WB.p).norm();
+  }
+  if (path > 0) score.drift_percent = 100 * score.end_error_m / path;
   return score;
 }
 
-void add_figures(const OdometryScore& score, Figures& figures) {
-  figures.set("odometry.ate_rmse_m", score.ate_rmse_m);
-  figures.set("odometry.ate_max_m", score.ate_max_m);
-  figures.set("odometry.ate_se3_rmse_m", score.ate_se3_rmse_m);
-  figures.set("odometry.yaw_error_max_deg", score.yaw_error_max_deg);
-  figures.set("odometry.start_tilt_deg", score.start_tilt_deg);
-  figures.set("odometry.rpe_1m_m", score.rpe_1m_m);
-  figures.set("odometry.rpe_10m_m", score.rpe_10m_m);
+void add_figures(const OdometryScore& score, const std::string& section, Figures& figures) {
+  figures.set(section + ".ate_rmse_m", score.ate_rmse_m);
+  figures.set(section + ".ate_max_m", score.ate_max_m);
+  figures.set(section + ".ate_se3_rmse_m", score.ate_se3_rmse_m);
+  figures.set(section + ".yaw_error_max_deg", score.yaw_error_max_deg);
+  figures.set(section + ".start_tilt_deg", score.start_tilt_deg);
+  figures.set(section + ".rpe_1m_m", score.rpe_1m_m);
+  figures.set(section + ".rpe_10m_m", score.rpe_10m_m);
+  figures.set(section + ".end_error_m", score.end_error_m);
+  figures.set(section + ".drift_percent", score.drift_percent);
 }
 
 }  // namespace arex::sim

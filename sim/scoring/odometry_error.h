@@ -28,6 +28,8 @@ struct OdometryScore {
   double start_tilt_deg = kUnknown;     ///< of O's z axis from the vertical: gravity at start-up
   double rpe_1m_m = kUnknown;           ///< relative position error over 1 m of path, RMS
   double rpe_10m_m = kUnknown;          ///< the same over 10 m
+  double end_error_m = kUnknown;        ///< of the last position, aligned at the first pose
+  double drift_percent = kUnknown;      ///< the same, of the length of the true path
 };
 
 /// The pose of O in W that makes the first pair agree.
@@ -48,7 +50,8 @@ double relative_error(const std::vector<PosePair>& pairs, double path_m, std::si
 /// @pre pairs are in order of time. An empty run has no score.
 OdometryScore score_odometry(const std::vector<PosePair>& pairs);
 
-/// Sets the figures `odometry.*` that the poses tell.
-void add_figures(const OdometryScore& score, Figures& figures);
+/// Sets the figures of the section that the poses tell.
+/// @param section "odometry", or "odometries.NAME"
+void add_figures(const OdometryScore& score, const std::string& section, Figures& figures);
 
 }  // namespace arex::sim

@@ -30,7 +30,7 @@ struct SurfaceSampleConfig {
 /// triangles in order, and inside a triangle the R2 sequence, so that a large triangle is as evenly
 /// covered as many small ones (M. Roberts, The unreasonable effectiveness of quasirandom sequences,
 /// 2018). A pure function of the world.
-/// @param region in W; samples outside it are dropped. Ground, floor and ramp count as ground.
+/// @param region_W in W; samples outside it are dropped. Ground, floor and ramp count as ground.
 std::vector<SurfaceSample> sample_surfaces(const worlds::World& world,
                                            const worlds::Bounds& region_W,
                                            const SurfaceSampleConfig& config = {});

@@ -17,7 +17,7 @@ struct VisibilityConfig {
   void fields(auto& f) {
     f("range_m", range_m, "a surface is seen from at most this far away (map's ray length)");
     f("max_incidence_deg", max_incidence_deg,
-      "nor flatter than this: half of the LiDAR's beams return (reference.md, section 2)");
+      "nor flatter than this: half of the LiDAR's beams return");
     f("viewpoint_spacing_m", viewpoint_spacing_m, "one viewpoint in each cube of this side");
     f.check(range_m > 0 && range_m <= 200, "0 < range_m <= 200");
     f.check(max_incidence_deg > 0 && max_incidence_deg <= 90, "0 < max_incidence_deg <= 90");

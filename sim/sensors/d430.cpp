@@ -12,7 +12,7 @@ D430::D430(const D430Config& config, const worlds::World& world, const Pose& X_B
       renderer_(world, config.camera(), {.far_m = config.draw_range_m}),
       stereo_(config) {}
 
-DepthImagePtr D430::capture(Stamp stamp, const Pose& X_WB) {
+std::shared_ptr<DepthImage> D430::capture(Stamp stamp, const Pose& X_WB) {
   renderer_.render_inverse_depth(X_WB * X_BC_, inverse_depth_);
   auto image = std::make_shared<DepthImage>();
   image->stamp = stamp;

@@ -22,7 +22,7 @@ class D430 {
   D430(const D430Config& config, const worlds::World& world, const Pose& X_BC, std::uint64_t seed);
 
   /// The frame taken at `stamp` with the body at X_WB.
-  [[nodiscard]] DepthImagePtr capture(Stamp stamp, const Pose& X_WB);
+  [[nodiscard]] std::shared_ptr<DepthImage> capture(Stamp stamp, const Pose& X_WB);
 
   [[nodiscard]] Renderer::Statistics last_frame() const { return renderer_.last_frame(); }
 

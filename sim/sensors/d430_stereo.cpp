@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "math/mix.h"
+
 // Plain loops over rows that the compiler turns into vector code (CMakeLists.txt gives this file
 // -O3); no loop carries a float sum, so the vector width changes no bit.
 namespace arex::sim {
@@ -12,18 +14,13 @@ namespace {
 
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
-std::uint64_t mix(std::uint64_t x) {  // SplitMix64's finaliser, as in arex::RandomStream
-  x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-  x = (x ^ (x >> 27U)) * 0x94D049BB133111EBULL;
-  return x ^ (x >> 31U);
-}
 constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
 
 /// Eight uniform bytes per hash; `bytes` is a multiple of 8.
 void fill_with_random_bytes(std::uint64_t seed, void* out, std::size_t bytes) {
   auto* p = static_cast<unsigned char*>(out);
   for (std::size_t i = 0; i < bytes / 8; ++i) {
-    const std::uint64_t word = mix(seed + (i + 1) * kGolden);
+    const std::uint64_t word = mix_bits(seed + (i + 1) * kGolden);
     std::memcpy(p + 8 * i, &word, 8);
   }
 }
@@ -74,10 +71,10 @@ void StereoModel::measure(const std::vector<float>& inverse_depth, std::uint64_t
     disparity_[i] = inverse_depth[i] * focal_baseline;
   }
   find_edges();
-  find_lost_at_edges(mix(frame_seed + 1));
+  find_lost_at_edges(mix_bits(frame_seed + 1));
   find_occluded();
   find_oblique(inverse_depth);
-  draw_noise(mix(frame_seed + 2));
+  draw_noise(mix_bits(frame_seed + 2));
   finish(depth_m);
 }
 

@@ -11,7 +11,7 @@ namespace arex::sim {
 /// The depth camera: an Intel RealSense D430 in its 848 x 480 mode.
 struct D430Config {
   bool noise_free = false;  ///< exact depths; only the range limits stay. For tests
-  int rate_hz = 30;         ///< paper, III-A
+  int rate_hz = 30;         ///< paper, II-A
   int width_px = 848;
   int height_px = 480;
   double focal_px = 446.8;    ///< 87 deg across (datasheet)
@@ -29,7 +29,7 @@ struct D430Config {
 
   void fields(auto& f) {
     f("noise_free", noise_free, "exact depths within the range limits, for tests");
-    f("rate_hz", rate_hz, "frames per second (paper, III-A)");
+    f("rate_hz", rate_hz, "frames per second (paper, II-A)");
     f("width_px", width_px, "image columns");
     f("height_px", height_px, "image rows");
     f("focal_px", focal_px, "focal length (datasheet: 87 deg across 848 px)");
@@ -78,7 +78,7 @@ struct D430Config {
 /// so that sigma_z = z^2 s / (f B). Lost are: pixels whose match lies outside the right image (a
 /// band of f B / z px on the left) or behind something nearer (the half-occluded strip left of
 /// every foreground object); 2 to 4 px at depth edges; surfaces seen too obliquely; depths out of
-/// range. Source: reference.md, section 3.
+/// range. Source: models/arex/README.md.
 class StereoModel {
  public:
   explicit StereoModel(const D430Config& config);

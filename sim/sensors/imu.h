@@ -25,7 +25,7 @@ struct ImuConfig {
   double accel_scale_sigma_fraction = 0.001;  ///< [E] datasheet 0.5 % worst case
   double accel_range_mps2 = 16 * kGravity;    ///< 16 g
   double clock_offset_s = 0;                  ///< the device's clock minus true time
-  int output_rate_hz = 200;                   ///< paper, III-A
+  int output_rate_hz = 200;                   ///< paper, II-A
   double output_cutoff_hz = 90;               ///< [E] just below half the output rate
   VibrationConfig vibration;
   int magnetometer_rate_hz = 50;                  ///< [E]
@@ -49,7 +49,7 @@ struct ImuConfig {
     f("accel_scale_sigma_fraction", accel_scale_sigma_fraction, "scale error of each axis [E]");
     f("accel_range_mps2", accel_range_mps2, "clipped beyond: 16 g");
     f("clock_offset_s", clock_offset_s, "the device's clock minus true time");
-    f("output_rate_hz", output_rate_hz, "samples to the stack (paper, III-A)");
+    f("output_rate_hz", output_rate_hz, "samples to the stack (paper, II-A)");
     f("output_cutoff_hz", output_cutoff_hz, "second-order low-pass before decimation [E]");
     f("vibration", vibration, "what the rotors shake into it");
     f("magnetometer_rate_hz", magnetometer_rate_hz, "samples [E]");

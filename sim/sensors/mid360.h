@@ -8,6 +8,7 @@
 #include "math/random.h"
 #include "messages/sensors.h"
 #include "physics/truth.h"
+#include "sensors/lidar_model.h"
 #include "sensors/mid360_airframe.h"
 #include "sensors/mid360_echo.h"
 #include "sensors/mid360_pattern.h"
@@ -80,16 +81,16 @@ struct Mid360Config {
 
 /// Livox MID-360: 200,000 firings a second, each cast from the vehicle's pose at its own time.
 ///
-/// A frame is a pure function of the true states it spans: scans may be made on any thread, in any
-/// order. Firing i draws from its own stream, so that no beam's luck depends on another's.
-class Mid360 {
+/// Firing i draws from its own stream, so that no beam's noise depends on another's.
+class Mid360 : public LidarModel {
  public:
   /// @param airframe_B the vehicle's solids in B (X_WS is the pose in B, object the AirframePart).
   Mid360(const Mid360Config& config, const Scene& scene, const Pose& X_BL,
          const std::vector<worlds::CollisionShape>& airframe_B, std::uint64_t seed);
 
-  /// One frame. @pre the stamps are consecutive ticks; a frame of n ticks has n + 1 of them.
-  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks) const;
+  [[nodiscard]] Stamp period() const override { return config_.period(); }
+  /// @throws std::invalid_argument unless the stamps are consecutive ticks.
+  [[nodiscard]] LidarScan scan(std::span<const Truth> ticks) const override;
 
   /// The beams of a frame in firing order, as the scan casts them; for tests and benchmarks.
   [[nodiscard]] std::vector<Ray> beams(std::span<const Truth> ticks) const;

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "worlds/triangle.h"
+
 namespace arex::sim {
 namespace {
 
@@ -98,30 +100,6 @@ void note_all(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-/// Nearest point of triangle (a, b, c) to p.
-/// Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
-Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  }
-  const double scale = 1 / (va + vb + vc);
-  return a + vb * scale * ab + vc * scale * ac;
-}
-
 struct NearestQuery {
   Vec3 p_W;
   double best_m;
@@ -139,7 +117,7 @@ bool visit_triangle(RTCPointQueryFunctionArguments* args) {
   const Vec3 a = nearest.vertices[t[0]].cast<double>();
   const Vec3 b = nearest.vertices[t[1]].cast<double>();
   const Vec3 c = nearest.vertices[t[2]].cast<double>();
-  const double distance = (nearest_on_triangle(nearest.p_W, a, b, c) - nearest.p_W).norm();
+  const double distance = (worlds::nearest_on_triangle(nearest.p_W, a, b, c) - nearest.p_W).norm();
   if (distance >= nearest.best_m) return false;
   nearest.best_m = distance;
   args->query->radius = static_cast<float>(distance) + widening(static_cast<float>(distance));

@@ -33,8 +33,8 @@ sigset_t gate_signals() {
 }
 
 /// What the child does between fork and exec: calls that are safe there only.
-[[noreturn]] void become(const char* program, char* const* argv, const char* folder, int output,
-                         pid_t parent) {
+[[noreturn]] void exec_child(const char* program, char* const* argv, const char* folder, int output,
+                             pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);  // Ctrl-C in a terminal is for the parent, which ends its children itself
@@ -69,7 +69,7 @@ ChildProcess::ChildProcess(const std::filesystem::path& program,
   fcntl(output_, F_SETFL, O_APPEND);
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(program.c_str(), argv.data(), folder.c_str(), output_, parent);
+  if (pid_ == 0) exec_child(program.c_str(), argv.data(), folder.c_str(), output_, parent);
   if (pid_ < 0) {
     const int error = errno;
     close(output_);

@@ -12,7 +12,6 @@
 #include "run/file_io.h"
 #include "run/foreign_json.h"
 #include "run/summary.h"
-#include "run/trajectory_hash.h"
 #include "sweep/child_process.h"
 
 namespace arex::sim {
@@ -72,11 +71,8 @@ std::vector<fs::path> batch_files(const SweepFolder& folder) {
 
 // One name, one batch of one folder: that is how it is found again in the queue.
 std::string batch_name(const SweepFolder& folder, const std::string& sweep, std::size_t number) {
-  TrajectoryHash hash;
-  const std::string root = folder.root().string();
-  hash.add_bytes(std::span<const char>(root));
-  std::string name =
-      "arex-" + sweep + "-" + hash.text().substr(0, 8) + "-" + std::to_string(number);
+  const std::string root = content_hash(folder.root().string());
+  std::string name = "arex-" + sweep + "-" + root.substr(0, 8) + "-" + std::to_string(number);
   for (char& c : name) {
     const bool plain =
         std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';

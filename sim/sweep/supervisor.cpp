@@ -1,9 +1,9 @@
 #include "sweep/supervisor.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -28,9 +28,7 @@ std::string last_line(const std::string& text) {
 // What ended a run that left no valid summary, in words that are the same each time.
 RunState diagnose(const ChildExit& exit, bool overran, double timeout_s) {
   if (overran) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "killed after %g s", timeout_s);
-    return {Failure::kOverran, text.data()};
+    return {Failure::kOverran, fmt::format("killed after {:g} s", timeout_s)};
   }
   if (exit.signal != 0) {
     return {Failure::kCrashed,
@@ -69,7 +67,7 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
     refill();
     if (SignalGate::wait(kLongestWait_s) != 0) {
       stop_all();
-      tell();
+      report_progress();
       return SweepEnd::kInterrupted;
     }
     kill_overdue();
@@ -79,7 +77,7 @@ SweepEnd Supervisor::fly(const std::vector<RunOrder>& orders) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     if (settled != progress_.finished + progress_.broken || progress_.elapsed_s > told_s + 1) {
       told_s = progress_.elapsed_s;
-      tell();
+      report_progress();
     }
   }
   return disk_full_.empty() ? SweepEnd::kDone : SweepEnd::kDiskFull;
@@ -126,17 +124,17 @@ void Supervisor::collect() {
   }
   refill();  // no core waits for the disk
   for (const auto& [flight, exit] : ended) {
-    if (!settle(flight, exit)) waiting_.emplace_back(flight.order, flight.attempt + 1);
+    if (!finish_attempt(flight, exit)) waiting_.emplace_back(flight.order, flight.attempt + 1);
   }
 }
 
-bool Supervisor::settle(const Flight& flight, const ChildExit& exit) {
+bool Supervisor::finish_attempt(const Flight& flight, const ChildExit& exit) {
   const RunOrder& order = *flight.order;
   const RunState state = diagnose(exit, flight.overran, options_.timeout_s);
   try {
     if (!flight.overran && keep(flight, exit)) return true;
     folder_.log("broken", order.id, flight.attempt, state.detail);
-    if (speaks_of_a_full_disk(exit.output) || !accepts_writes(folder_.root())) {
+    if (names_full_disk(exit.output) || !accepts_writes(folder_.root())) {
       disk_full_ = last_line(exit.output);
       if (disk_full_.empty()) disk_full_ = folder_.root().string() + ": takes no more";
     } else if (state.failure == Failure::kRefused || flight.attempt > options_.retries) {
@@ -193,7 +191,7 @@ void Supervisor::stop_all() {
   }
 }
 
-void Supervisor::tell() {
+void Supervisor::report_progress() {
   progress_.running = flights_.size();
   const std::size_t settled = progress_.finished + progress_.broken;
   if (progress_.finished > 0) {

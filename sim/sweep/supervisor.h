@@ -69,12 +69,12 @@ class Supervisor {
   void kill_overdue();
   void collect();
   /// @return whether the run is done with, one way or the other.
-  bool settle(const Flight& flight, const ChildExit& exit);
+  bool finish_attempt(const Flight& flight, const ChildExit& exit);
   bool keep(const Flight& flight, const ChildExit& exit);
   void give_up(const RunOrder& order, const RunState& state, int attempts,
                const std::string& output);
   void stop_all();
-  void tell();
+  void report_progress();
 
   const SweepFolder& folder_;
   std::filesystem::path program_;

@@ -1,7 +1,9 @@
 #include "sweep/sweep_plan.h"
 
+#include <fmt/format.h>
+#include <xxhash.h>
+
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -12,7 +14,6 @@
 
 #include "math/random.h"
 #include "run/scenario.h"
-#include "run/trajectory_hash.h"
 
 namespace arex::sim {
 namespace {
@@ -43,12 +44,10 @@ std::string flow_text(const ConfigNode& node) {
 
 // Six digits name a sample as well as sixteen.
 std::string sample_text(double value, HypercubeAxis::Scale scale) {
-  std::array<char, 32> buffer{};
   if (scale == HypercubeAxis::Scale::kInteger) {
     return std::to_string(static_cast<long long>(value));
   }
-  std::snprintf(buffer.data(), buffer.size(), "%.6g", value);
-  return buffer.data();
+  return fmt::format("{:.6g}", value);
 }
 
 double scaled(const HypercubeAxis& axis, double u) {
@@ -208,23 +207,18 @@ class Expander {
 
 std::string run_id(const std::string& build, const std::string& scenario, int repeat,
                    const std::string& resolved) {
-  const std::string text =
-      build + "\n" + scenario + "\n" + std::to_string(repeat) + "\n" + resolved;
-  TrajectoryHash hash;
-  hash.add_bytes(std::span<const char>(text));
-  return hash.text();
+  return content_hash(build + "\n" + scenario + "\n" + std::to_string(repeat) + "\n" + resolved);
 }
 
-std::string fingerprint(const std::filesystem::path& file) {
+std::string content_hash(std::string_view bytes) {
+  return fmt::format("{:016x}", XXH3_64bits(bytes.data(), bytes.size()));
+}
+
+std::string content_hash_of_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  std::vector<char> block(1 << 20);
-  TrajectoryHash hash;
-  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())),
-         stream.gcount() > 0) {
-    hash.add_bytes(std::span<const char>(block.data(), static_cast<std::size_t>(stream.gcount())));
-  }
-  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be read");
-  return hash.text();
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be read");
+  return content_hash(bytes);
 }
 
 std::vector<const PlannedRun*> SweepPlan::flying_order() const {
@@ -262,10 +256,7 @@ SweepPlan expand(const SweepFile& sweep, const std::string& build) {
   plan.retries = sweep.retries;
   const std::vector<Variant> variants = variants_of(sweep);
   if (const double runs = count_runs(sweep); runs > kMostRuns) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.15g", runs);
-    fail(sweep.where, "asks for " + std::string(text.data()) + " runs, expected at most " +
-                          std::to_string(kMostRuns));
+    fail(sweep.where, fmt::format("asks for {:.15g} runs, expected at most {}", runs, kMostRuns));
   }
   const std::vector<Point> samples = hypercube_points(sweep.hypercube);
   const std::vector<Point> grid = grid_points(sweep.grid);

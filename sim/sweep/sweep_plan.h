@@ -23,7 +23,7 @@ struct PlannedRun {
 /// All runs of a sweep, in the order of its table.
 struct SweepPlan {
   std::string name;
-  std::string build;              ///< fingerprint of the binary that flies
+  std::string build;              ///< hash of the binary that flies
   std::vector<std::string> keys;  ///< every key that `list`, `latin_hypercube` or `grid` varies
   bool has_variants = false;
   int repeats = 1;
@@ -47,7 +47,9 @@ SweepPlan expand(const SweepFile& sweep, const std::string& build);
 std::string run_id(const std::string& build, const std::string& scenario, int repeat,
                    const std::string& resolved);
 
-/// Fingerprint of a file's bytes: 16 hexadecimal digits. @throws std::runtime_error.
-std::string fingerprint(const std::filesystem::path& file);
+/// XXH3 of bytes, as 16 hexadecimal digits.
+std::string content_hash(std::string_view bytes);
+/// The same of a file's. @throws std::runtime_error.
+std::string content_hash_of_file(const std::filesystem::path& file);
 
 }  // namespace arex::sim

@@ -49,10 +49,10 @@ std::string joined(const std::vector<std::string>& cells) {
 }
 
 /// A table whose rows come with named cells behind fixed ones.
-class Table {
+class RowTable {
  public:
   /// @param expected columns that are there whatever the rows hold
-  Table(std::vector<std::string> head, const Fields& expected) : head_(std::move(head)) {
+  RowTable(std::vector<std::string> head, const Fields& expected) : head_(std::move(head)) {
     columns_.add(expected);
   }
 
@@ -120,7 +120,9 @@ Fields part_of(const Fields& fields, bool host) {
 // Every figure's column, so that a table's columns do not depend on what its runs measured.
 Fields empty_fields() {
   Fields fields;
-  for (const FigureInfo& figure : figure_list()) fields.emplace_back(figure.column(), "");
+  for (const FigureInfo& figure : figure_list()) {
+    if (!figure.is_named()) fields.emplace_back(figure.column(), "");
+  }
   return fields;
 }
 
@@ -128,9 +130,9 @@ Fields empty_fields() {
 
 SweepTables sweep_tables(const SweepPlan& plan, const SweepFolder& folder) {
   std::vector<std::string> head = identity_head(plan);
-  Table host(head, part_of(empty_fields(), true));
+  RowTable host(head, part_of(empty_fields(), true));
   head.insert(head.end(), {"failure", "detail"});
-  Table results(head, part_of(empty_fields(), false));
+  RowTable results(head, part_of(empty_fields(), false));
   for (const PlannedRun& run : plan.runs) {
     const auto summary = folder.summary(run.id);
     const RunState state = summary ? RunState{Failure::kNone, ""} : folder.state(run.id);

@@ -45,6 +45,11 @@ TEST(BinaryFuzz, DamagedInputsAreReadOrRefusedWithOneLine) {
                          what);
       }
     }
+    const auto world = write_damaged_world(folder.path(), random);
+    write_text(folder / "world.yaml",
+               "world: {kind: file, file: {path: " + world.filename().string() + "}}\n");
+    expect_an_answer({"10", AREX_BINARY, "validate", (folder / "world.yaml").string()},
+                     "world " + std::to_string(number) + ", " + world.filename().string());
     const auto run = folder / "run";
     write_files(recorded_run(), run);
     damage_files(recorded_run(), run, random);

@@ -26,4 +26,8 @@ void write_files(const Corpus& corpus, const std::filesystem::path& folder);
 /// Damages one or two of the files that were written, or removes them.
 void damage_files(const Corpus& corpus, const std::filesystem::path& folder, RandomStream& random);
 
+/// Writes a mesh, Gazebo world, octree or cloud and damages it. @return the file
+std::filesystem::path write_damaged_world(const std::filesystem::path& folder,
+                                          RandomStream& random);
+
 }  // namespace arex::test

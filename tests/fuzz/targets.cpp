@@ -6,9 +6,11 @@
 
 #include "autonomy/semantics/cloud_bytes.h"
 #include "config/config.h"
+#include "evaluation/comparison.h"
 #include "fuzz/corpus.h"
 #include "fuzz/mutation.h"
 #include "report/comparison_report.h"
+#include "report/evaluation_report.h"
 #include "report/page.h"
 #include "report/result_table.h"
 #include "report/run_record.h"
@@ -84,6 +86,26 @@ void read_flight(const fs::path& folder, RandomStream& random) {
   sim::load_scenario(folder / "resolved.yaml", {}, {});
 }
 
+// Somebody's trajectory, in each of the formats, against a whole one.
+void compare_trajectories(const fs::path& folder, RandomStream& random) {
+  std::string tum, euroc, kitti;
+  for (int i = 0; i < 12; ++i) {
+    const std::string x = std::to_string(i), y = std::to_string(i * i % 7);
+    tum += x + " " + x + " " + y + " 1 0 0 0 1\n";
+    euroc += x + "000000000," + x + "," + y + ",1,1,0,0,0,0.1,0.1,0.1\n";
+    kitti += "1 0 0 " + x + " 0 1 0 " + y + " 0 0 1 1\n";
+  }
+  const bool stamped = random.uniform() < 0.7;
+  const std::string& whole = stamped ? random.uniform() < 0.5 ? tum : euroc : kitti;
+  const std::string damaged = damage_bytes(whole, {tum, euroc, kitti, "nan", "1e59", "-0"}, random);
+  write_text(folder / "estimate.txt", damaged);
+  sim::EvaluationOptions options;
+  options.alignment = static_cast<sim::Alignment>(random.uniform_int(0, 5));
+  static_cast<void>(sim::evaluation_report_html(
+      sim::compare(sim::parse_trajectory(stamped ? tum : kitti, "truth"),
+                   {sim::read_trajectory(folder / "estimate.txt")}, options)));
+}
+
 void report_sweep(const fs::path& folder, RandomStream& random) {
   write_files(recorded_sweep(), folder);
   damage_files(recorded_sweep(), folder, random);
@@ -104,6 +126,13 @@ void read_batch(const fs::path& folder, RandomStream& random) {
       damage_bytes(R"({"timeout_s": 60.0, "retries": 1, "runs": [{"id": "0", "scenario": "x"}]})",
                    {"[[[[[[", "{\"runs\": 3}", "\"id\": 7,"}, random));
   sim::load_batch(folder / "batch.json");
+}
+
+void read_world_file(const fs::path& folder, RandomStream& random) {
+  worlds::FileRecipe recipe;
+  recipe.path = write_damaged_world(folder, random).string();
+  constexpr double kVehicleRadius = 0.29;  // m
+  static_cast<void>(worlds::load_file_world(recipe, kVehicleRadius));
 }
 
 // What a sweep finds in a folder that others have written.
@@ -143,10 +172,12 @@ std::vector<Target> all_targets() {
           {"run report", report_run},
           {"overrides, too", read_overrides},
           {"flight", read_flight},
+          {"trajectories", compare_trajectories},
           {"sweep report", report_sweep},
           {"requirement", read_requirement},
           {"batch", read_batch},
           {"sweep folder", read_sweep_folder},
+          {"world file", read_world_file},
           {"cloud", read_cloud},
           {"scenario, too", read_scenario}};
 }

@@ -18,5 +18,4 @@ struct Target {
 };
 
 std::vector<Target> all_targets();
-
 }  // namespace arex::test

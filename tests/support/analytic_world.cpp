@@ -12,7 +12,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMaxRange = 40;
 constexpr double kPi = std::numbers::pi;
 
-/// Direction of the MID-360's firing i in L, device mode (reference.md, 2).
+/// Direction of the MID-360's firing i in L, device mode.
 Vec3 firing_direction(std::int64_t i) {
   const double k = static_cast<double>(i % 4), n = static_cast<double>(i / 4);
   const double s = 2 * k - 3;

@@ -46,7 +46,7 @@ class AnalyticWorld {
   bool has_ground_ = false;
 };
 
-/// Noise of the sensors; zero is a noise-free sensor (reference.md, 2 and 4).
+/// Noise of the sensors; zero is a noise-free sensor (models/arex/README.md).
 struct SensorNoise {
   double lidar = 1;  ///< factor on the range noise's model
   double extra_range_m = 0;

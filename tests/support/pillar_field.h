@@ -11,9 +11,9 @@
 
 namespace arex::support {
 
-/// A random pillar field as in reference.md, section 10: 30 x 30 x 3 m at 0.1 m, upright pillars
-/// of radius 0.1-0.3 m over the whole height at uniform places, and cubic inflation: every cell
-/// within ceil(inflation / 0.1) cells of an occupied one, on each axis, is inflated.
+/// A random pillar field: 30 x 30 x 3 m at 0.1 m, upright pillars of radius 0.1-0.3 m over the
+/// whole height at uniform places, and cubic inflation: every cell within ceil(inflation / 0.1)
+/// cells of an occupied one, on each axis, is inflated.
 struct PillarFieldOptions {
   int pillars = 90;  ///< per 900 m^2
   double inflation_m = 0.3;

@@ -21,7 +21,7 @@ World small_forest() {
   ForestRecipe recipe;
   recipe.size_m = {14, 12};
   recipe.tree.leaves = 40;
-  return build_forest(recipe, 3);
+  return build(recipe, 3);
 }
 
 template <class T>
@@ -92,7 +92,7 @@ TEST(Export, MujocoLoadsEveryShapeAndTheTerrain) {
 
 TEST(Export, MujocoLoadsLevelGround) {
   const TemporaryFolder folder;
-  write_mjcf(build_empty(EmptyRecipe{}, 1), folder / "world.xml");
+  write_mjcf(build(EmptyRecipe{}, 1), folder / "world.xml");
   std::array<char, 1000> error{};
   mjModel* model = mj_loadXML((folder / "world.xml").c_str(), nullptr, error.data(), error.size());
   ASSERT_NE(model, nullptr) << error.data();
@@ -139,7 +139,7 @@ TEST(Export, Map2dShowsTheWallAndItsOpening) {
   const TemporaryFolder folder;
   GapsRecipe recipe;
   recipe.gap_m = 1.2;
-  const World world = build_gaps(recipe, 1);
+  const World world = build(recipe, 1);
   ExportConfig config;
   config.band_low_m = 0.2;
   export_world(world, config, folder / "out");

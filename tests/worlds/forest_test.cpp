@@ -68,15 +68,15 @@ std::size_t count_class(const World& world, SurfaceClass surface_class) {
 
 TEST(Forest, IsThePureFunctionOfRecipeAndSeed) {
   const ForestRecipe recipe = small_forest();
-  const World one = build_forest(recipe, 7);
-  const World two = build_forest(recipe, 7);
+  const World one = build(recipe, 7);
+  const World two = build(recipe, 7);
   EXPECT_EQ(one.mesh.vertices, two.mesh.vertices);
   EXPECT_EQ(one.mesh.triangles, two.mesh.triangles);
   EXPECT_EQ(world_hash(one), world_hash(two));
-  EXPECT_NE(world_hash(one), world_hash(build_forest(recipe, 8)));
+  EXPECT_NE(world_hash(one), world_hash(build(recipe, 8)));
   ForestRecipe other = recipe;
   other.tree.height_m += 0.01;
-  EXPECT_NE(world_hash(one), world_hash(build_forest(other, 7)));
+  EXPECT_NE(world_hash(one), world_hash(build(other, 7)));
 }
 
 TEST(Forest, TreesHaveTheAskedDensityAndSpacing) {
@@ -118,7 +118,7 @@ TEST(Forest, TreesSpreadEvenly) {
 
 TEST(Forest, CollisionShapesHoldTheWoodTightly) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const World world = build_forest(small_forest(), seed);
+    const World world = build(small_forest(), seed);
     const auto shapes = shapes_by_object(world);
     const auto triangles = triangles_by_object(world);
     for (std::size_t object = 0; object < world.objects.size(); ++object) {
@@ -139,7 +139,7 @@ TEST(Forest, CollisionShapesHoldTheWoodTightly) {
 }
 
 TEST(Forest, TrunkShapesStandOutOfTheMeshByCentimetresAtMost) {
-  const World world = build_forest(small_forest(), 4);
+  const World world = build(small_forest(), 4);
   const auto shapes = shapes_by_object(world);
   const auto triangles = triangles_by_object(world);
   RandomStream random(1, "capsule surface");
@@ -173,7 +173,7 @@ TEST(Forest, TrunkShapesStandOutOfTheMeshByCentimetresAtMost) {
 }
 
 TEST(Forest, EveryTwigBelowFourMetresIsSolid) {
-  const World world = build_forest(small_forest(), 5);
+  const World world = build(small_forest(), 5);
   const auto shapes = shapes_by_object(world);
   const auto triangles = triangles_by_object(world);
   std::size_t checked = 0;
@@ -195,7 +195,7 @@ TEST(Forest, EveryTwigBelowFourMetresIsSolid) {
 }
 
 TEST(Forest, HasBranchesAtFlightHeightDownToOneCentimetre) {
-  const World world = build_forest(small_forest(), 6);
+  const World world = build(small_forest(), 6);
   int at_flight_height = 0;
   double thinnest = 1;
   for (const CollisionShape& shape : world.collision_shapes) {
@@ -212,7 +212,7 @@ TEST(Forest, HasBranchesAtFlightHeightDownToOneCentimetre) {
 }
 
 TEST(Forest, LeavesAndGroundHaveNoCollisionShapes) {
-  const World world = build_forest(small_forest(), 7);
+  const World world = build(small_forest(), 7);
   for (const CollisionShape& shape : world.collision_shapes) {
     const SurfaceClass c = world.objects[shape.object].surface_class;
     EXPECT_NE(c, SurfaceClass::kLeaf);
@@ -221,7 +221,7 @@ TEST(Forest, LeavesAndGroundHaveNoCollisionShapes) {
 }
 
 TEST(Forest, DefaultHoldsThePapersBoundsAndTheLeavesOfACanopy) {
-  const World world = build_forest(ForestRecipe{}, 1);
+  const World world = build(ForestRecipe{}, 1);
   // Exploration bounds of +-25 m and +-20 m around the start (paper, scene 1), with a margin.
   EXPECT_LE(world.bounds.low.x(), world.X_WS.p.x() - 27);
   EXPECT_GE(world.bounds.high.x(), world.X_WS.p.x() + 27);
@@ -251,7 +251,7 @@ TEST(Forest, GroundUndulatesAsAsked) {
     recipe.undergrowth.shrub_density_per_m2 = 0;
     recipe.undergrowth.fern_density_per_m2 = 0;
     recipe.undergrowth.log_density_per_m2 = 0;
-    const HeightField terrain = build_forest(recipe, seed).terrain;
+    const HeightField terrain = build(recipe, seed).terrain;
     double sum = 0, sum2 = 0;
     for (const float h : terrain.height_m) {
       sum += static_cast<double>(h);
@@ -267,7 +267,7 @@ TEST(Forest, ClearingsCorridorsAndTheStartAreFree) {
   ForestRecipe recipe;
   recipe.clearings.push_back({{12, 8}, 5});
   recipe.corridors.push_back({{{-20, -10}, {0, -10}, {15, -15}}, 3});
-  const World world = build_forest(recipe, 3);
+  const World world = build(recipe, 3);
   EXPECT_NEAR(world.X_WS.p.z(), world.terrain.at(0, 0), 1e-9);
   for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
     if (world.class_of_triangle(t) == SurfaceClass::kGround) continue;
@@ -288,10 +288,10 @@ TEST(Forest, ClearingsCorridorsAndTheStartAreFree) {
 
 TEST(Forest, AClearingLeavesTheRestAsItWas) {
   ForestRecipe recipe;
-  const World before = build_forest(recipe, 5);
+  const World before = build(recipe, 5);
   const std::vector<TreeSite> sites = place_trees(recipe, 5);
   recipe.clearings.push_back({{10, 5}, 6});
-  const World after = build_forest(recipe, 5);
+  const World after = build(recipe, 5);
   EXPECT_LT(place_trees(recipe, 5).size(), sites.size());
   // Far from the clearing every trunk has the same shapes, to the bit.
   const auto trunks = [](const World& world) {
@@ -311,7 +311,7 @@ TEST(Forest, AClearingLeavesTheRestAsItWas) {
 TEST(Forest, GrowsAMillionLeaves) {
   ForestRecipe recipe;
   recipe.tree.leaves = 4200;
-  const World world = build_forest(recipe, 1);
+  const World world = build(recipe, 1);
   EXPECT_GT(count_class(world, SurfaceClass::kLeaf) / 2, 950000U);
 }
 

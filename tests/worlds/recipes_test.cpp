@@ -30,8 +30,8 @@ TEST(BuildWorld, GivesASolvableGarageForEverySeed) {
 }
 
 TEST(BuildWorld, IsDeterministicForEveryKind) {
-  for (const WorldKind kind :
-       {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps, WorldKind::kEmpty}) {
+  for (const WorldKind kind : {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps,
+                               WorldKind::kEmpty, WorldKind::kOrchard}) {
     const WorldConfig config = config_of(kind);
     const std::uint64_t hash = world_hash(build_world(config, 3, kRadius));
     EXPECT_EQ(world_hash(build_world(config, 3, kRadius)), hash);
@@ -40,14 +40,14 @@ TEST(BuildWorld, IsDeterministicForEveryKind) {
 }
 
 TEST(BuildWorld, LiesWithinTheExtentThatIsKnownBefore) {
-  for (const WorldKind kind :
-       {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps, WorldKind::kEmpty}) {
+  for (const WorldKind kind : {WorldKind::kForest, WorldKind::kGarage, WorldKind::kGaps,
+                               WorldKind::kEmpty, WorldKind::kOrchard}) {
     WorldConfig config = config_of(kind);
     config.forest.size_m = {40, 30};
     config.gaps.width_m = 12;
     config.empty.size_m = {20, 24};
     config.garage.length_m = 80;
-    const Eigen::AlignedBox2d extent = extent_of(config);
+    const Eigen::AlignedBox2d extent = extent_of(config).value();
     const World world = build_world(config, 2, kRadius);
     EXPECT_TRUE(world.X_WS.p.head<2>().isZero()) << static_cast<int>(kind);
     // Walls and the ground's last cell stand just outside; the garage's entrance before x = 0.
@@ -105,7 +105,7 @@ TEST(Gaps, OpeningIsExactInTheMeshAndInTheShapes) {
     GapsRecipe recipe;
     recipe.gap_m = gap;
     recipe.gap_offset_m = 1.7;
-    const World world = build_gaps(recipe, 1);
+    const World world = build(recipe, 1);
     // The nearest surfaces on either side of the opening's middle, along y.
     double below = -1e9, above = 1e9;
     for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
@@ -133,7 +133,7 @@ TEST(Gaps, TheOpeningIsTheOnlyWay) {
   for (const double gap : {0.5, 1.1}) {
     GapsRecipe recipe;
     recipe.gap_m = gap;
-    const World world = build_gaps(recipe, 1);
+    const World world = build(recipe, 1);
     const OccupancyGrid occupancy = voxelize(world, make_grid(world.bounds, 0.1), ClassSet::all());
     const Vec3 start(0, 0, 1);
     const Vec3 beyond(recipe.wall_distance_m + 3, 0, 1);
@@ -144,7 +144,7 @@ TEST(Gaps, TheOpeningIsTheOnlyWay) {
 TEST(Gaps, FieldStandsBeforeTheWallAndKeepsItsSpacing) {
   GapsRecipe recipe;
   recipe.field_density_per_m2 = 0.1;
-  const World world = build_gaps(recipe, 2);
+  const World world = build(recipe, 2);
   std::vector<Vec2> field;
   for (const CollisionShape& shape : world.collision_shapes) {
     if (shape.kind != CollisionShape::Kind::kCylinder) continue;
@@ -162,7 +162,7 @@ TEST(Gaps, FieldStandsBeforeTheWallAndKeepsItsSpacing) {
 }
 
 TEST(Empty, IsLevelGround) {
-  const World world = build_empty(EmptyRecipe{}, 1);
+  const World world = build(EmptyRecipe{}, 1);
   EXPECT_TRUE(world.collision_shapes.empty());
   for (const Vec3f& v : world.mesh.vertices) EXPECT_EQ(v.z(), 0.0F);
   EXPECT_EQ(world.terrain.at(3.3, -4.4), 0.0);

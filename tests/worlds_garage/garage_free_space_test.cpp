@@ -58,7 +58,7 @@ Vec3 inside(const GarageRecipe& recipe, const GarageRoom& room) {
 /// Everything of the hall that a vehicle fits into is reached, but for the shut rooms.
 void expect_connected(const GarageRecipe& recipe, std::uint64_t seed) {
   SCOPED_TRACE("seed " + std::to_string(seed));
-  const World world = build_garage(recipe, seed);
+  const World world = build(recipe, seed);
   const GaragePlan plan = plan_garage(recipe, seed);
   const FreeSpace space = free_space_of(world);
   ASSERT_TRUE(space.at(world.X_WS * kHover)) << "the start is not free";
@@ -153,7 +153,7 @@ TEST(GarageFreeSpace, ReachesTheWholeFloorInRecipesDrawnAtRandom) {
 
 TEST(GarageFreeSpace, StartIsLevelClearAndFacesTheRamp) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const World world = build_garage({}, seed);
+    const World world = build({}, seed);
     EXPECT_TRUE(world.X_WS.R.isIdentity());
     const auto ground = probe::cast(world, world.X_WS * Vec3(0.1, 0.1, 0.5), {0, 0, -1});
     ASSERT_TRUE(ground);
@@ -172,7 +172,7 @@ TEST(GarageFreeSpace, StartIsLevelClearAndFacesTheRamp) {
 TEST(GarageFreeSpace, DoorwaysHaveTheRecipesWidthAndHeight) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const GarageRecipe recipe;
-    const World world = build_garage(recipe, seed);
+    const World world = build(recipe, seed);
     for (const GarageRoom& room : plan_garage(recipe, seed).rooms) {
       const Vec3 out(room.outward.x(), room.outward.y(), 0);
       const Vec3 door(room.door.x(), room.door.y(), recipe.floor_z_m + 1.0);

@@ -21,7 +21,7 @@ TEST(Garage, RampDescendsAtItsAngle) {
   for (const double angle_deg : {20.0, 30.0, 35.0}) {
     GarageRecipe recipe;
     recipe.ramp_angle_deg = angle_deg;
-    const World world = build_garage(recipe, 1);
+    const World world = build(recipe, 1);
     const double slope = std::tan(angle_deg * std::numbers::pi / 180);
     const double run = -recipe.floor_z_m / slope;
     const double y = 0.7;  // beside the painted line
@@ -37,7 +37,7 @@ TEST(Garage, RampDescendsAtItsAngle) {
 }
 
 TEST(Garage, RampIsOpenAboveItsMouthAndHighEnoughBelow) {
-  const World world = build_garage({}, 2);
+  const World world = build({}, 2);
   const GaragePlan plan = plan_garage({}, 2);
   const double slope = std::tan(std::numbers::pi / 6);
   for (const double y : {-2.2, -1.0, 0.0, 1.0, 2.2}) {
@@ -54,7 +54,7 @@ TEST(Garage, RampIsOpenAboveItsMouthAndHighEnoughBelow) {
 
 TEST(Garage, FloorAndCeilingAreWhereTheRecipeSays) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const World world = build_garage({}, seed);
+    const World world = build({}, seed);
     RandomStream random(seed, "probe");
     int floor_hits = 0, ceiling_hits = 0;
     constexpr int kRays = 150;
@@ -79,7 +79,7 @@ TEST(Garage, FloorAndCeilingAreWhereTheRecipeSays) {
 }
 
 TEST(Garage, HallIsClosedAllAround) {
-  const World world = build_garage({}, 5);
+  const World world = build({}, 5);
   RandomStream random(5, "probe");
   for (int i = 0; i < 300; ++i) {
     // The far half: from the ramp's side some rays leave through the mouth, as they should.
@@ -92,7 +92,7 @@ TEST(Garage, HallIsClosedAllAround) {
 
 TEST(Garage, PillarsStandOnTheGridFromFloorToCeiling) {
   const GarageRecipe recipe;
-  const World world = build_garage(recipe, 3);
+  const World world = build(recipe, 3);
   const double pitch = recipe.pillar_spacing_m, half = 0.5 * recipe.pillar_width_m;
   const auto by_object = probe::triangles_by_object(world);
   int pillars = 0;
@@ -163,7 +163,7 @@ double tolerance(SurfaceClass c) {
 
 TEST(Garage, WhatTheVehicleCanHitIsDrawn) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    const World world = build_garage({}, seed);
+    const World world = build({}, seed);
     const auto by_object = probe::triangles_by_object(world);
     RandomStream random(seed, "probe");
     int compared = 0;
@@ -196,7 +196,7 @@ TEST(Garage, WhatTheVehicleCanHitIsDrawn) {
 }
 
 TEST(Garage, WhatIsDrawnCanBeHit) {
-  const World world = build_garage({}, 3);
+  const World world = build({}, 3);
   const auto by_object = probe::triangles_by_object(world);
   RandomStream random(3, "probe");
   int rods = 0, compared = 0;
@@ -231,7 +231,7 @@ TEST(Garage, CarsTouchNeitherEachOtherNorTheBuilding) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     GarageRecipe recipe;
     recipe.occupancy_fraction = 1.0;
-    const World world = build_garage(recipe, seed);
+    const World world = build(recipe, seed);
     const auto class_of = [&](const CollisionShape& s) {
       return world.objects[s.object].surface_class;
     };

@@ -17,7 +17,7 @@ namespace {
 TEST(Garage, SameRecipeAndSeedGiveTheSameBytes) {
   std::set<std::uint64_t> hashes;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const World first = build_garage({}, seed), second = build_garage({}, seed);
+    const World first = build({}, seed), second = build({}, seed);
     EXPECT_EQ(world_hash(first), world_hash(second));
     ASSERT_EQ(first.mesh.vertices.size(), second.mesh.vertices.size());
     EXPECT_TRUE(first.mesh.vertices == second.mesh.vertices);
@@ -27,11 +27,11 @@ TEST(Garage, SameRecipeAndSeedGiveTheSameBytes) {
   EXPECT_EQ(hashes.size(), 3U) << "seeds must differ";
   GarageRecipe other;
   other.occupancy_fraction = 0.3;
-  EXPECT_EQ(hashes.count(world_hash(build_garage(other, 1))), 0U);
+  EXPECT_EQ(hashes.count(world_hash(build(other, 1))), 0U);
 }
 
 TEST(Garage, EverythingIsLabelledChunkedAndWithinBounds) {
-  const World world = build_garage({}, 7);
+  const World world = build({}, 7);
   const auto by_object = probe::triangles_by_object(world);
   for (std::size_t i = 0; i < world.objects.size(); ++i) {
     EXPECT_FALSE(by_object[i].empty()) << "object " << i << " cannot be seen";

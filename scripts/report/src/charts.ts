@@ -12,6 +12,8 @@ export interface Line {
   right?: boolean;
   /** An edge of a band: not drawn itself, not in the legend. */
   edge?: boolean;
+  /** Drawn, but not in the legend: one of several lines of one name. */
+  unnamed?: boolean;
 }
 
 export interface Band {
@@ -54,12 +56,16 @@ export function setMark(time: number): void {
   for (const { plot } of charts) plot.redraw(false, false);
 }
 
-/** Forgets every chart; the caller takes their elements away. */
-export function clearCharts(): void {
-  for (const { plot, box } of charts.splice(0)) {
+/** Takes every chart and whatever else is there out of `parent`. */
+export function clearCharts(parent: HTMLElement): void {
+  for (let i = charts.length - 1; i >= 0; --i) {
+    const { plot, box } = charts[i];
+    if (!parent.contains(box)) continue;
+    charts.splice(i, 1);
     resized.unobserve(box);
     plot.destroy();
   }
+  parent.replaceChildren();
 }
 
 function fit({ plot, box }: { plot: uPlot; box: HTMLElement }): void {
@@ -187,17 +193,23 @@ function pointRange(_plot: uPlot, min: number, max: number): uPlot.Range.MinMax 
   return [min - room, max + room];
 }
 
+/** Nothing while no moment is pointed at. */
+function legendValue(value: number | null, index: number | null, unit = ''): string {
+  if (index === null) return '';
+  return value === null ? '–' : `${shown(value)} ${unit}`.trim();
+}
+
 function series(line: Line, spec: ChartSpec): uPlot.Series {
   return {
     label: line.label,
     scale: line.right ? 'right' : 'y',
-    class: line.edge ? 'edge' : undefined,
+    class: line.edge || line.unnamed ? 'edge' : undefined,
     stroke: () => (line.edge ? 'transparent' : themeColour(line.colour)),
     width: 1.5,
     paths: spec.names ? () => null : undefined, // nothing lies between two names
     spanGaps: false,
     points: { show: (spec.points ?? false) && !line.edge, size: 6, fill: () => themeColour(line.colour) },
-    value: (_plot, value) => (value === null ? '–' : `${shown(value)} ${line.unit}`.trim()),
+    value: (_plot, value, _series, index) => legendValue(value, index, line.unit),
   };
 }
 
@@ -241,7 +253,7 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
       scales,
       axes,
       series: [
-        { label: spec.xLabel, value: (_plot, value) => (value === null ? '–' : shown(value)) },
+        { label: spec.xLabel, value: (_plot, value, _series, index) => legendValue(value, index) },
         ...lines.map((line) => series(line, spec)),
       ],
       bands: (spec.names ? [] : spec.bands)?.map((band) => ({
@@ -253,6 +265,8 @@ export function addChart(parent: HTMLElement, spec: ChartSpec): void {
         drag: { x: true, y: false },
         points: { size: 6 },
       },
+      // By the variable's name, so that it follows the theme and goes to paper.
+      legend: { markers: { stroke: (_plot, i) => `var(${lines[i - 1]?.colour})` } },
       plugins: spec.bands ? [whiskerPlugin(spec.bands), dotPlugin(spec.dots ?? [])] : spec.sync === 'time' ? [markPlugin()] : [],
     },
     [gaps(spec.x), ...lines.map((line) => gaps(line.values))] as uPlot.AlignedData,

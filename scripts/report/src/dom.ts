@@ -41,3 +41,12 @@ export function shown(value: number | null | undefined, digits = 4): string {
   if (Number.isInteger(value) && Math.abs(value) < 1e6) return String(value);
   return String(Number(value.toPrecision(digits)));
 }
+
+type Choice = (label: string, id: string, options: string[], chosen: string, change: (value: string) => void,
+  name?: (option: string) => string) => HTMLLabelElement;
+/** A labelled list to choose from. */
+export const choice: Choice = (label, id, options, chosen, change, name = (option) => option) => {
+  const select = element('select', { id, change: () => change(select.value) });
+  for (const option of options) select.append(element('option', { value: option, selected: option === chosen }, name(option)));
+  return element('label', {}, label, select);
+};

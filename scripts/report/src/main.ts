@@ -8,7 +8,7 @@ import { showSweep } from './sweep';
 async function main(): Promise<void> {
   const payload = JSON.parse(byId('data').textContent ?? '') as RunPayload | SweepPayload;
   if (payload.kind === 'run') await showRun(payload);
-  else showSweep(payload);
+  else await showSweep(payload);
   document.documentElement.dataset.ready = 'yes';
 }
 

@@ -77,6 +77,16 @@ export interface FigureInfo {
   main: boolean;
 }
 
+/** Runs laid over each other, on axes that they share. */
+export interface OverlayPayload {
+  /** The colours' names: of runs, or of configurations with several runs each. */
+  groups: string[];
+  /** Those without a colour as well. */
+  all_groups: number;
+  axes: Record<'time_s' | 'distance_m', { end: number; steps: number }>;
+  runs: ({ title: string; group: number } & Record<'time_s' | 'distance_m', Record<string, Quantised>>)[];
+}
+
 export interface SweepPayload {
   kind: 'sweep';
   /** What is known of the columns that are figures. */
@@ -86,9 +96,13 @@ export interface SweepPayload {
   columns: string[];
   /** Seeds and hashes are texts, whatever their digits. */
   rows: Cell[][];
+  /** What tells each run from the others. */
+  titles: string[];
+  /** Their folders' names. */
   runs: string[];
   /** Of each run's report or folder; empty if it is gone. */
   links: string[];
+  overlay: OverlayPayload;
 }
 
 /** The last index whose t is not after `time`; -1 if there is none. */

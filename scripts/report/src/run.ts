@@ -69,7 +69,7 @@ function followOnMap(replay: Replay, track: Track | null): void {
   if (!map || !track || track.t.length === 0) return;
   const here = document.createElementNS('http://www.w3.org/2000/svg', 'circle');
   here.setAttribute('class', 'here');
-  here.setAttribute('r', map.dataset.unit ?? '1');
+  here.setAttribute('r', String(0.6 * Number(map.dataset.unit ?? 1))); // the start's ring stays to be seen
   map.append(here);
   replay.onChange((time) => {
     const i = Math.max(0, indexAt(track.t, time));
@@ -229,11 +229,13 @@ export async function showRun(run: RunPayload): Promise<void> {
   addScene(section, transport, replay, { run, cloud, truth, estimate, candidates: { x, y } });
   followOnMap(replay, truth ?? estimate);
 
-  const charts = byId('charts');
-  charts.replaceChildren();
+  const charts = element('div', { id: 'charts' });
+  const againstTime = byId('against-time');
+  againstTime.replaceChildren(element('h2', {}, 'Against time'), charts);
   const pick = (time: number) => replay.set(time);
   coverageCharts(charts, coverage, pick);
   flightCharts(charts, flight, pick);
+  againstTime.hidden = charts.childElementCount === 0;
   replay.onChange(setMark);
   linkMoments(replay);
   // report.html#t=70 opens at that moment.

@@ -36,17 +36,40 @@ function turbo(u: number): [number, number, number] {
   ];
 }
 
+const LEAST_POINT_PX = 1.8;
+
+function pixelRatio(): number {
+  return Math.min(devicePixelRatio, 2);
+}
+
 function percentile(values: Float64Array, share: number): number {
   const sorted = Float64Array.from(values).sort();
   return sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
-/** Discs instead of squares. */
+/** Discs instead of squares, and never so small that a far surface dissolves into dust. */
 function makeRound(material: PointsMaterial): void {
   material.onBeforeCompile = (shader) => {
     const round = 'void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard;';
     shader.fragmentShader = shader.fragmentShader.replace('void main() {', round);
+    const least = `gl_PointSize = max(gl_PointSize, ${(LEAST_POINT_PX * pixelRatio()).toFixed(2)});\n`;
+    const last = '#include <logdepthbuf_vertex>';
+    shader.vertexShader = shader.vertexShader.replace(last, least + last);
   };
+}
+
+/** What a point must measure so that the points together close the surfaces they lie on, m. */
+function closingSize(cloud: Columns, below: number): number {
+  const counts = new Map<number, number>(); // of points in columns of 1 m^2
+  for (let i = 0; i < cloud.z.length; ++i) {
+    if (cloud.z[i] > below) continue;
+    const cell = Math.floor(cloud.x[i]) * 0x10000 + Math.floor(cloud.y[i]);
+    counts.set(cell, (counts.get(cell) ?? 0) + 1);
+  }
+  if (counts.size === 0) return 0.1;
+  // Discs of 1.5 times their spacing, lying at random, leave a sixth of the ground open.
+  const spacing = 1 / Math.sqrt(percentile(Float64Array.from(counts.values()), 0.4));
+  return Math.min(0.5, Math.max(0.1, 1.5 * spacing));
 }
 
 /** A path that grows: `upTo` shows its beginning. */
@@ -169,7 +192,10 @@ export class FlightScene {
     this.heights = cloud.z.length ? [percentile(cloud.z, 0.001), percentile(cloud.z, 0.999)] : [0, 1];
     const track = data.truth ?? data.estimate;
     const level = track ? percentile(track.z, 0.5) : 0;
-    this.firstCut = track && ceilingOver(cloud, track, level) ? level + 0.5 : null;
+    // Under a ceiling or in a wood, whatever is above the flight hides it.
+    const above = cloud.z.reduce((count, z) => count + Number(z > level + 1.5), 0);
+    this.firstCut = track && ceilingOver(cloud, track, level) ? level + 0.5
+      : track && above > 0.15 * cloud.z.length ? level + 1.5 : null;
     this.addCloud();
     for (const [name, width] of [['truth', 3], ['estimate', 2.5]] as const) {
       const path = data[name];
@@ -196,18 +222,38 @@ export class FlightScene {
     const axes = (['x', 'y', 'z'] as const).map((axis) => {
       const ends = [this.data.truth, this.data.estimate, this.data.cloud]
         .filter((of) => of !== null && of[axis].length > 0)
-        .flatMap((of) => [percentile(of![axis], 0.01), percentile(of![axis], 0.99)]);
+        .flatMap((of) => [percentile(of![axis], 0.005), percentile(of![axis], 0.995)]);
       return [Math.min(...ends), Math.max(...ends)];
     });
     if (!Number.isFinite(axes[0][0])) return;
-    const centre = new Vector3(...axes.map(([low, high]) => (low + high) / 2));
-    const diagonal = Math.hypot(...axes.map(([low, high]) => high - low));
-    // A narrow view needs more room.
-    const reach = (0.5 * Math.max(10, diagonal)) / Math.min(1, this.camera.aspect);
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).add(new Vector3(-0.45, -0.95, 1.0).multiplyScalar(reach));
+    if (this.firstCut !== null) axes[2][1] = Math.max(axes[2][0], Math.min(axes[2][1], this.firstCut));
+    this.fit(axes, new Vector3(-0.45, -0.95, 1.0).normalize());
     this.controls.update();
     this.ask();
+  }
+
+  /** Places the camera in a direction so that a box just fills the view. */
+  private fit(axes: number[][], towardsCamera: Vector3): void {
+    const centre = new Vector3(...axes.map(([low, high]) => (low + high) / 2));
+    const forward = towardsCamera.clone().negate();
+    const right = forward.clone().cross(this.camera.up).normalize();
+    const up = right.clone().cross(forward);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
+      new Vector3(axes[0][i & 1], axes[1][(i >> 1) & 1], axes[2][(i >> 2) & 1]).sub(centre));
+    // A corner at depth z in front of the centre is inside while |offset| <= (distance + z) slope.
+    const tangent = Math.tan((this.camera.fov * Math.PI) / 360);
+    const along = (axis: Vector3, slope: number) => {
+      const ends = corners.map((c) => [c.dot(axis), slope * c.dot(forward)]);
+      const high = Math.max(...ends.map(([offset, depth]) => offset - depth));
+      const low = Math.min(...ends.map(([offset, depth]) => offset + depth));
+      return { shift: (high + low) / 2, distance: (high - low) / (2 * slope) };
+    };
+    const across = along(right, tangent * this.camera.aspect);
+    const upwards = along(up, tangent);
+    const distance = 1.05 * Math.max(5, across.distance, upwards.distance);
+    const target = centre.addScaledVector(right, across.shift).addScaledVector(up, upwards.shift);
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(towardsCamera, distance);
   }
 
   show(layer: Layer, visible: boolean): void {
@@ -281,7 +327,8 @@ export class FlightScene {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(positions, 3));
     geometry.setAttribute('color', new BufferAttribute(colours, 3, true));
-    const material = new PointsMaterial({ size: 0.12, vertexColors: true, clippingPlanes: [this.cut] });
+    const size = closingSize(this.data.cloud, this.firstCut ?? Infinity);
+    const material = new PointsMaterial({ size, vertexColors: true, clippingPlanes: [this.cut] });
     makeRound(material);
     this.points = new Points(geometry, material);
     this.points.frustumCulled = false;
@@ -345,6 +392,8 @@ export class FlightScene {
     this.scene.background = new Color(themeColour('--scene'));
     this.lines.truth?.paint();
     this.lines.estimate?.paint();
+    // Full turbo is pale on a light page.
+    (this.points?.material as PointsMaterial | undefined)?.color.set(themeColour('--cloud-tint'));
     const vehicle = (this.vehicle.children[0] as Mesh).material as MeshBasicMaterial;
     vehicle.color.set(themeColour('--vehicle'));
     for (const { mesh, reached } of this.targets) {
@@ -366,7 +415,7 @@ export class FlightScene {
   private resize(box: HTMLElement): void {
     const width = Math.max(1, box.clientWidth);
     const height = Math.max(1, box.clientHeight);
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(pixelRatio());
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();

@@ -1,20 +1,13 @@
 // A sweep, or runs side by side: curves, heat map, two configurations, the table.
 
 import { Dot, addChart, clearCharts } from './charts';
-import { byId, element, onThemeChange, shown, themeColour } from './dom';
+import { byId, choice, element, onThemeChange, shown, themeColour } from './dom';
+import { showOverlay } from './overlay';
 import { Cell, SweepPayload } from './payload';
 import { Results, SUCCESS, compare, scaled, shortKey } from './results';
 import { Estimate, LEAST_FOR_INTERVAL, estimateMean, shareDifference } from './statistics';
 
 const LINE_COLOURS = 6; // --line-1 ... of the style sheet
-
-type Choice = (label: string, id: string, options: string[], chosen: string, change: (value: string) => void,
-  name?: (option: string) => string) => HTMLLabelElement;
-const choice: Choice = (label, id, options, chosen, change, name = (option) => option) => {
-  const select = element('select', { id, change: () => change(select.value) });
-  for (const option of options) select.append(element('option', { value: option, selected: option === chosen }, name(option)));
-  return element('label', {}, label, select);
-};
 
 /** The mean; of a few values, the values themselves. */
 function middle(estimate: Estimate): string {
@@ -93,8 +86,7 @@ class FigureView {
   }
 
   private drawCurves(): void {
-    clearCharts();
-    this.charts.replaceChildren();
+    clearCharts(this.charts);
     const { results, across, by, figure } = this;
     const levels = results.levels(across);
     const numeric = levels.every((level) => typeof level === 'number');
@@ -182,7 +174,7 @@ function heatCell(estimate: Estimate, { low, high }: { low: number; high: number
 /** Two configurations, figure by figure, paired by what they share. */
 function sideBySide(results: Results, section: HTMLElement): void {
   const configurations = results.configurations();
-  if (configurations.length < 2) return;
+  if (configurations.length < 2) return overall(results, section);
   const names = configurations.map((c) => c.name);
   const chosen = [names[0], names[names.length - 1]];
   const box = element('div', { class: 'scroll' });
@@ -210,6 +202,27 @@ function sideBySide(results: Results, section: HTMLElement): void {
       'marked. Among many figures, one in twenty does so by chance.'),
   );
   draw();
+}
+
+/** Of a single configuration: each figure over its runs. */
+function overall(results: Results, section: HTMLElement): void {
+  const rows = results.rows();
+  if (rows.length < 2) return;
+  const body = element('tbody');
+  for (const figure of results.figures) {
+    const estimate = results.estimate(rows, figure);
+    if (estimate.n === 0) continue;
+    const ends = figure === SUCCESS ? [NaN, NaN] : [Math.min(...estimate.values), Math.max(...estimate.values)];
+    body.append(element('tr', { 'data-figure': figure }, element('td', { class: 'word', title: figure }, results.title(figure)),
+      element('td', {}, interval(estimate)), ...ends.map((end) => element('td', {}, shown(end))), element('td', {}, String(estimate.n))));
+  }
+  const head = element('tr', {}, element('th', { class: 'word' }, 'figure'), element('th', {}, 'mean (95 % interval)'),
+    element('th', {}, 'least'), element('th', {}, 'greatest'), element('th', {}, 'runs'));
+  section.append(
+    element('h2', {}, 'Over all runs'),
+    element('div', { class: 'scroll' }, element('table', { class: 'data' }, element('thead', {}, head), body)),
+    element('p', { class: 'note' }, `Of the runs that succeeded (${results.successes(rows)}); of a flight that failed no figure is comparable.`),
+  );
 }
 
 /** A row's seed and repetition where no other row of its side has them: what can be paired. */
@@ -267,12 +280,13 @@ class RunTable {
   }
 
   private columns(): string[] {
-    const { columns, keys } = this.results.payload;
+    const { columns } = this.results.payload;
     if (this.all) return columns;
     const { figures, rows } = this.results.payload;
     const measured = (name: string) => rows.some((_row, i) => this.results.cell(i, name) !== null);
     const main = Object.keys(figures).filter((name) => figures[name].main && measured(name));
-    return [...new Set([...keys, 'seed', 'failure', ...main])].filter((name) => columns.includes(name));
+    return [...new Set([...this.results.factors, 'seed', 'failure', ...main])]
+      .filter((name) => columns.includes(name) && (name === 'seed' || measured(name)));
   }
 
   private order(): number[] {
@@ -303,11 +317,11 @@ class RunTable {
 
   private draw(): void {
     const columns = this.columns();
-    const { runs, links } = this.results.payload;
+    const { runs, titles, links } = this.results.payload;
     const body = element('tbody');
     for (const row of this.order()) {
-      const link = links[row] ? element('a', { href: links[row] }, runs[row]) : runs[row];
-      const line = element('tr', {}, element('td', { class: 'word' }, link));
+      const link = links[row] ? element('a', { href: links[row] }, titles[row]) : titles[row];
+      const line = element('tr', {}, element('td', { class: 'word', title: runs[row] }, link));
       for (const name of columns) {
         const cell = this.results.cell(row, name);
         const { factor } = this.results.display(name);
@@ -320,10 +334,12 @@ class RunTable {
   }
 }
 
-export function showSweep(payload: SweepPayload): void {
+export async function showSweep(payload: SweepPayload): Promise<void> {
   const results = new Results(payload);
   if (payload.rows.length === 0) return;
+  byId('runs').replaceChildren();
   if (results.factors.length > 0) new FigureView(results, byId('figures'));
+  await showOverlay(payload.overlay, byId('coverage'));
   sideBySide(results, byId('side'));
   new RunTable(results, byId('runs'));
 }

@@ -162,6 +162,86 @@ TEST(Config, RejectsDuplicateKeysAndBrokenFiles) {
   EXPECT_THROW(load_yaml("/tmp"), ConfigError);
 }
 
+/// A section whose keys depend on the kind of thing that it names.
+struct Vehicle {
+  struct Car {
+    int wheels = 4;
+    void fields(auto& f) { f("wheels", wheels, "on the road"); }
+  };
+  struct Boat {
+    double draught_m = 1.5;
+    void fields(auto& f) {
+      f("draught_m", draught_m, "below the water");
+      f.check(draught_m > 0, "draught_m > 0");
+    }
+  };
+  std::string name, kind;
+  ConfigNode own;
+
+  void read(std::string_view given, const ConfigNode& section) {
+    name = given;
+    const ConfigNode* named = section.find("kind");
+    if (named) config_detail::parse_scalar(*named, "kind", kind);
+    own = section;
+    std::erase_if(own.entries, [](const auto& entry) { return entry.key == "kind"; });
+    static_cast<void>(parameters());
+  }
+  [[nodiscard]] std::vector<ParameterInfo> parameters() const {
+    std::vector<ParameterInfo> all{{"kind", kind, "", "of vehicle"}};
+    const auto more = kind == "boat" ? given_parameters<Boat>(own) : given_parameters<Car>(own);
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+};
+struct Fleet {
+  std::map<std::string, Vehicle> vehicles;
+  std::map<std::string, Vehicle::Boat> boats;
+  void fields(auto& f) {
+    f("vehicles", vehicles, "by name");
+    f("boats", boats, "by name");
+  }
+};
+
+TEST(Config, ReadsSectionsByNameWhoseKeysDependOnWhatTheySay) {
+  Fleet fleet;
+  read_config(parse_yaml("vehicles:\n  ann: {kind: boat, draught_m: 0.7}\n  bob: {kind: car}\n"
+                         "boats: {}\n",
+                         "a.yaml"),
+              fleet);
+  ASSERT_EQ(fleet.vehicles.size(), 2U);
+  EXPECT_EQ(fleet.vehicles.at("ann").name, "ann");
+  const std::string text = write_yaml(list_parameters(fleet));
+  EXPECT_EQ(text,
+            "vehicles:\n  ann:\n    kind: boat\n    draught_m: 0.7\n  bob:\n    kind: car\n"
+            "boats: {}\n");
+  Fleet again;
+  read_config(parse_yaml(text, "b.yaml"), again);
+  EXPECT_EQ(write_yaml(list_parameters(again)), text);
+}
+
+TEST(Config, StaysStrictInSectionsByName) {
+  const auto error = [](const std::string& yaml) -> std::string {
+    Fleet fleet;
+    try {
+      read_config(parse_yaml(yaml, "a.yaml"), fleet);
+    } catch (const ConfigError& refused) {
+      return refused.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error("vehicles: {ann: {kind: boat, wheels: 4}}\n"),
+            "a.yaml:1: unknown key 'wheels'; did you mean 'draught_m'?");
+  EXPECT_EQ(error("vehicles:\n  ann: {kind: boat, draught_m: -1}\n"),
+            "a.yaml:2: out of range: expected draught_m > 0");
+  EXPECT_EQ(error("boats: [1]\n"),
+            "a.yaml:1: 'boats' is a list, expected a map of sections by name");
+  EXPECT_EQ(error("boats: {ann: 3}\n"), "a.yaml:1: 'ann' is '3', expected a map of keys");
+  EXPECT_EQ(error("boats:\n  a.b: {}\n"),
+            "a.yaml:2: the name 'a.b', expected at most 40 letters, digits and underscores");
+  EXPECT_NE(error("boats: {" + std::string(41, 'x') + ": {}}\n").find("expected at most 40"),
+            std::string::npos);
+}
+
 TEST(Config, ListsKeysUnitsAndMeanings) {
   const auto list = list_parameters(Outer{});
   const auto found = std::find_if(list.begin(), list.end(),

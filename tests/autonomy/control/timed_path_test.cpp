@@ -64,7 +64,6 @@ TimedPath random_path(std::uint64_t seed, const TimedPathConfig& config,
     path.fly_to({random.uniform(-10, 10), random.uniform(-10, 10), random.uniform(0.5, 3)});
     corners.push_back(path.end());
   }
-  path.turn_to(random.uniform(-3, 3));
   path.wait(0.7);
   path.land_to(-1);
   corners.push_back(path.end());

@@ -1,8 +1,8 @@
-#include "exploration/explorer.h"
-
 #include <gtest/gtest.h>
 
 #include "autonomy/exploration/test_map.h"
+#include "exploration/nearest_explorer.h"
+#include "exploration/revenue_explorer.h"
 
 namespace arex {
 namespace {
@@ -98,9 +98,7 @@ struct Flight {
   double open_area_m2 = 0;  ///< the largest frontier of the exhaustive search at the end
 };
 
-Flight explore(std::uint64_t seed, const ExplorerConfig& config) {
-  GridWorld world(seed, config);
-  Explorer explorer(world.config(), world.map().resolution, seed);
+Flight explore(GridWorld& world, Explorer& explorer) {
   Flight flight;
   for (int i = 0; i < 600; ++i) {
     flight.last = explorer.decide(world.map(), world.input());
@@ -116,6 +114,23 @@ Flight explore(std::uint64_t seed, const ExplorerConfig& config) {
     flight.open_area_m2 = std::max(flight.open_area_m2, f.unknown_area_m2);
   }
   return flight;
+}
+
+Flight explore(std::uint64_t seed, const ExplorerConfig& config) {
+  GridWorld world(seed, config);
+  RevenueExplorer explorer(world.config(), world.map().resolution, seed);
+  return explore(world, explorer);
+}
+
+TEST(Explorer, TheNearestFrontierExploresRandomMazesToTheEnd) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    GridWorld world(seed, light());
+    NearestExplorer explorer(world.config(), world.map().resolution);
+    const Flight flight = explore(world, explorer);
+    EXPECT_EQ(flight.last.kind, DecisionKind::kStop);
+    EXPECT_GE(flight.known, 0.99) << "seed " << seed;
+    EXPECT_LT(flight.open_area_m2, light().stop.min_area_m2) << "seed " << seed;
+  }
 }
 
 TEST(Explorer, ExploresRandomMazesToTheEnd) {
@@ -167,10 +182,10 @@ struct Hall {
 TEST(Explorer, RecordsTheTermsOfEveryCandidate) {
   Hall hall;
   hall.config.flight_height_m = 1.2;
-  Explorer explorer(hall.config, 0.1, 1);
+  RevenueExplorer explorer(hall.config, 0.1, 1);
   const Decision d = explorer.decide(hall.map, hall.input);
   ASSERT_EQ(d.kind, DecisionKind::kNewTarget);
-  EXPECT_EQ(d.source, CandidateSource::kTrees);
+  EXPECT_EQ(d.source, "trees");
   ASSERT_TRUE(d.winner);
   const ExplorationSpace space(hall.map, hall.config.bounds, hall.config.space, {-6, 0});
   for (const Candidate& c : d.candidates) {
@@ -187,14 +202,27 @@ TEST(Explorer, RecordsTheTermsOfEveryCandidate) {
   EXPECT_EQ(d.target, d.candidates[*d.winner].point);
   EXPECT_EQ(d.goal_O.z(), 1.2);
   EXPECT_EQ(Vec2(d.goal_O.head<2>()), d.candidates[*d.winner].viewpoint);
-  EXPECT_NEAR(d.goal_yaw_rad, 0, 0.6);  // the unknown lies ahead
+}
+
+TEST(Explorer, TheNearestFrontierIsTheOneToWhichTheWayIsShortest) {
+  Hall hall;
+  test::fill(hall.map, {1, 1}, {12, 78}, OccupancyMap2D::kUnknown);  // behind it, and nearer
+  NearestExplorer explorer(hall.config, 0.1);
+  const Decision d = explorer.decide(hall.map, hall.input);
+  ASSERT_EQ(d.kind, DecisionKind::kNewTarget);
+  for (const Candidate& c : d.candidates) {
+    if (c.verdict == Verdict::kKept && c.information_m2 >= hall.config.stop.min_area_m2) {
+      EXPECT_GE(c.distance_m, d.candidates[*d.winner].distance_m);
+    }
+  }
+  EXPECT_LT(d.target.x(), -6);
 }
 
 TEST(Explorer, DropsATargetThatWasSeenFromAfar) {
   for (const bool reevaluate : {true, false}) {
     Hall hall;
     hall.config.reevaluate = reevaluate;
-    Explorer explorer(hall.config, 0.1, 1);
+    RevenueExplorer explorer(hall.config, 0.1, 1);
     const Decision first = explorer.decide(hall.map, hall.input);
     EXPECT_EQ(explorer.decide(hall.map, hall.input).kind, DecisionKind::kKeepTarget);
     test::fill(hall.map, {150, 1}, {170, 78}, OccupancyMap2D::kFree);
@@ -207,7 +235,7 @@ TEST(Explorer, DropsATargetThatWasSeenFromAfar) {
 
 TEST(Explorer, UnreachableTargetsAreLeftForAWhile) {
   Hall hall;
-  Explorer explorer(hall.config, 0.1, 1);
+  RevenueExplorer explorer(hall.config, 0.1, 1);
   const Decision first = explorer.decide(hall.map, hall.input);
   hall.input.progress = TargetProgress::kUnreachable;
   const Decision second = explorer.decide(hall.map, hall.input);
@@ -219,13 +247,13 @@ TEST(Explorer, UnreachableTargetsAreLeftForAWhile) {
 TEST(Explorer, GivesUpAfterTheLastStrikeAndSaysSo) {
   Hall hall;
   hall.config.blacklist.radius_m = 20;  // one place
-  Explorer explorer(hall.config, 0.1, 1);
+  RevenueExplorer explorer(hall.config, 0.1, 1);
   EXPECT_EQ(explorer.decide(hall.map, hall.input).kind, DecisionKind::kNewTarget);
   hall.input.progress = TargetProgress::kUnreachable;
   for (int strike = 1; strike < hall.config.blacklist.max_strikes; ++strike) {
     const Decision d = explorer.decide(hall.map, hall.input);
     EXPECT_EQ(d.kind, DecisionKind::kNewTarget);
-    EXPECT_EQ(d.source, CandidateSource::kForgiving);
+    EXPECT_EQ(d.source, "forgiving");
   }
   const Decision last = explorer.decide(hall.map, hall.input);
   EXPECT_EQ(last.kind, DecisionKind::kStop);
@@ -235,7 +263,7 @@ TEST(Explorer, GivesUpAfterTheLastStrikeAndSaysSo) {
 
 TEST(Explorer, ReachedButStillUnknownIsAStrike) {
   Hall hall;
-  Explorer explorer(hall.config, 0.1, 1);
+  RevenueExplorer explorer(hall.config, 0.1, 1);
   (void)explorer.decide(hall.map, hall.input);
   hall.input.progress = TargetProgress::kReached;
   EXPECT_EQ(explorer.decide(hall.map, hall.input).previous_end, TargetEnd::kStillUnknown);
@@ -247,15 +275,15 @@ TEST(Explorer, StopsWhenLittleIsLeft) {
   Hall hall;
   test::fill(hall.map, {150, 1}, {198, 78}, OccupancyMap2D::kFree);
   test::fill(hall.map, {150, 40}, {154, 44}, OccupancyMap2D::kUnknown);  // 0.25 m^2
-  Explorer explorer(hall.config, 0.1, 1);
+  RevenueExplorer explorer(hall.config, 0.1, 1);
   const Decision d = explorer.decide(hall.map, hall.input);
   EXPECT_EQ(d.kind, DecisionKind::kStop);
   EXPECT_EQ(d.stop_reason, StopReason::kLittleLeft);
   hall.config.stop.min_area_m2 = 0.2;
-  EXPECT_EQ(Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input).kind,
+  EXPECT_EQ(RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input).kind,
             DecisionKind::kNewTarget);
   test::fill(hall.map, {150, 40}, {154, 44}, OccupancyMap2D::kFree);
-  EXPECT_EQ(Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input).stop_reason,
+  EXPECT_EQ(RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input).stop_reason,
             StopReason::kNoCandidates);
 }
 
@@ -266,7 +294,7 @@ TEST(Explorer, StopsForTheBatteryByTheKnownWayHome) {
   test::fill(hall.map, {60, 1}, {60, 60}, OccupancyMap2D::kOccupied);
   hall.input.p_OB = {-3, -3.4, 1.5};
   hall.input.home_O = {-5, -3.4, 0};
-  const Decision open = Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
+  const Decision open = RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
   EXPECT_EQ(open.kind, DecisionKind::kNewTarget);
   EXPECT_GT(open.home_distance_m, 10);
   EXPECT_LT(open.home_distance_m, 16);
@@ -278,7 +306,7 @@ TEST(Explorer, StopsForTheBatteryByTheKnownWayHome) {
     hall.input.energy = ConsumptionModel(battery);
     hall.input.energy.add({0, battery.full_v, 0}, 0, false);
     hall.input.energy.add({3600 * kNanosecondsPerSecond, 10, (spare - left) / 10}, 0, false);
-    const Decision d = Explorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
+    const Decision d = RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
     EXPECT_EQ(d.kind == DecisionKind::kStop, left < 0);
     EXPECT_EQ(d.stop_reason, left < 0 ? StopReason::kBattery : StopReason::kNone);
   }
@@ -286,7 +314,7 @@ TEST(Explorer, StopsForTheBatteryByTheKnownWayHome) {
 
 TEST(Explorer, WaitsWhileItKnowsNothing) {
   const OccupancyMap2D map = test::make_map(100, 100, OccupancyMap2D::kUnknown);
-  Explorer explorer(light(), 0.1, 1);
+  RevenueExplorer explorer(light(), 0.1, 1);
   EXPECT_EQ(explorer.decide(map, ExplorerInput{}).kind, DecisionKind::kWait);
 }
 
@@ -306,7 +334,7 @@ struct Pocket : Hall {
 
 TEST(Explorer, BelievesThatNothingIsLeftOnlyWhereItReachesWhatItFlew) {
   Pocket pocket;
-  Explorer explorer(pocket.config, 0.1, 1);
+  RevenueExplorer explorer(pocket.config, 0.1, 1);
   const Decision d = explorer.decide(pocket.map, pocket.input);
   ASSERT_EQ(d.kind, DecisionKind::kGoBack);
   // To the nearest place that it flew through, as high as it was there.
@@ -319,7 +347,7 @@ TEST(Explorer, BelievesThatNothingIsLeftOnlyWhereItReachesWhatItFlew) {
 
 TEST(Explorer, GivesUpTheWayBackInTheEnd) {
   Pocket pocket;
-  Explorer explorer(pocket.config, 0.1, 1);
+  RevenueExplorer explorer(pocket.config, 0.1, 1);
   int tries = 0;
   Decision d = explorer.decide(pocket.map, pocket.input);
   for (; d.kind == DecisionKind::kGoBack && tries < 10; ++tries) {
@@ -335,7 +363,7 @@ TEST(Explorer, KnowsTheWayThatItFlewSinceTheMapWasMade) {
   for (int x = 40; x < 55; ++x) {
     pocket.input.flown_since.push_back(static_cast<std::uint32_t>(pocket.map.index({x, 40})));
   }
-  const Decision d = Explorer(pocket.config, 0.1, 1).decide(pocket.map, pocket.input);
+  const Decision d = RevenueExplorer(pocket.config, 0.1, 1).decide(pocket.map, pocket.input);
   EXPECT_EQ(d.kind, DecisionKind::kNewTarget);
 }
 
@@ -352,7 +380,7 @@ TEST(Explorer, FliesAtItsHeightAboveTheGroundOfTheGoal) {
       const double x = hall.map.origin.x() + 0.8 * (i % 25 + 0.5);
       hall.map.ground.heights.push_back(static_cast<float>(-8.5 - 0.02 * x));
     }
-    Explorer explorer(hall.config, 0.1, 1);
+    RevenueExplorer explorer(hall.config, 0.1, 1);
     const Decision d = explorer.decide(hall.map, hall.input);
     ASSERT_EQ(d.kind, DecisionKind::kNewTarget);
     const double floor = -8.5 - 0.02 * d.goal_O.x();
@@ -367,7 +395,7 @@ TEST(Explorer, CaseCActsOnlyWhereDirectionAware) {
     hall.config.revenue.direction_aware = aware;
     test::fill(hall.map, {1, 1}, {20, 78}, OccupancyMap2D::kUnknown);
     hall.input.p_OB = {4, 0, 1.5};
-    Explorer explorer(hall.config, 0.1, 1);
+    RevenueExplorer explorer(hall.config, 0.1, 1);
     (void)explorer.decide(hall.map, hall.input);
     test::fill(hall.map, {150, 1}, {170, 78}, OccupancyMap2D::kFree);
     hall.input.p_OB = {6, 0, 1.5};

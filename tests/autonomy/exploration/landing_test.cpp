@@ -59,8 +59,6 @@ TEST(Landing, NeedsTheWholeVehicleAndItsMarginOverClearGround) {
   hall.put({50, 40}, {50, 40}, 25);
   test::fill(hall.map, {50, 40}, {50, 40}, OccupancyMap2D::kFree);
   EXPECT_EQ(hall.finder().assess(hall.map, hall.at(50, 40, 1.5)), LandingGround::kClear);
-  hall.map.ground = {hall.map.origin, 20, 1, {0.0F}};
-  EXPECT_EQ(hall.finder().assess(hall.map, hall.at(50, 40, 1.5)), LandingGround::kClear);
   EXPECT_EQ(hall.finder().assess(hall.map, hall.at(50, 40, 3.5)), LandingGround::kObstructed);
 }
 
@@ -101,6 +99,24 @@ TEST(Landing, TakesTheNearestPlaceWithRoomElseTheNearestClearOne) {
   ASSERT_TRUE(narrow);
   EXPECT_EQ(narrow->kind, PlaceKind::kClear);
   EXPECT_NEAR(narrow->p_O.x(), hall.map.centre_of({0, 0}).x() + kFooting, 0.11);
+}
+
+TEST(Landing, MeansTheSameInAHallBelowTheStart) {
+  Hall hall;
+  hall.put({100, 40}, {100, 40}, 3);
+  for (std::size_t i = 0; i < hall.map.cells.size(); ++i) {
+    hall.map.floor.top[i] -= 80;
+    std::int16_t& overhead = hall.map.floor.overhead[i];
+    overhead = overhead == FloorMap::kNothing ? -50 : static_cast<std::int16_t>(overhead - 80);
+  }
+  hall.map.ground = {hall.map.origin, 20, 1, {-8.0F}};  // and a ceiling 3 m above it
+  hall.explorer.follow_ground = true;
+  EXPECT_EQ(hall.finder().assess(hall.map, hall.at(50, 40, -6.5)), LandingGround::kClear);
+  EXPECT_EQ(hall.finder().assess(hall.map, hall.at(100, 40, -6.5)), LandingGround::kObstructed);
+  const auto place = hall.find(hall.at(101, 40, -6.5));
+  ASSERT_TRUE(place);
+  EXPECT_EQ(place->kind, PlaceKind::kClear);
+  EXPECT_EQ(place->p_O.z(), hall.explorer.flight_height_m - 8);
 }
 
 TEST(Landing, NeverChoosesAPlaceBesideAThingThatOnlyThe3DMapKnows) {

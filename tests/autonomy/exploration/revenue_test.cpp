@@ -5,6 +5,8 @@
 #include "autonomy/exploration/test_map.h"
 #include "config/config.h"
 #include "exploration/explorer.h"
+#include "exploration/explorer_config.h"
+#include "exploration/frontier_search.h"
 
 namespace arex {
 namespace {

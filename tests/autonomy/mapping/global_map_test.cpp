@@ -71,10 +71,11 @@ TEST(GlobalMap, HasOctoMapsStatesAfterTheSameHitsAndMisses) {
     for (const Voxel& v : sets.hit) oracle.updateNode(to_key(v), true);
   }
   int wrong = 0, free = 0, occupied = 0;
+  const StateTree tree = map.octree();
   for_each_voxel({map.box().low.array() - 3, map.box().high.array() + 3}, [&](const Cell& c) {
     const int expected = state_in(oracle, {c.x(), c.y(), c.z()});
     const Vec3 p = kResolution * (c.cast<double>().array() + 0.5).matrix();
-    wrong += map.state(c) != expected || map.tree().state(p) != expected;
+    wrong += map.state(c) != expected || tree.state(p) != expected;
     free += expected == 0;
     occupied += expected == 1;
   });
@@ -86,7 +87,7 @@ TEST(GlobalMap, HasOctoMapsStatesAfterTheSameHitsAndMisses) {
   // The tree has the shape that OctoMap's own maximum-likelihood map has, and the same leaves.
   oracle.toMaxLikelihood();
   oracle.prune();
-  EXPECT_EQ(map.tree().nodes(), oracle.size());
+  EXPECT_EQ(tree.nodes(), oracle.size());
   TemporaryFolder folder;
   map.write_octomap(folder / "map.bt");
   octomap::OcTree read(0.5);

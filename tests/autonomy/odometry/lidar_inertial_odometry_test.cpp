@@ -225,13 +225,13 @@ TEST(LidarInertialOdometry, SurvivesEmptyScans) {
 }
 
 TEST(LidarInertialOdometry, SurvivesTheLossOfEveryFifthPoint) {
-  const Tamper thinned = [](const LidarScanPtr& scan) {
+  const Tamper downsampled = [](const LidarScanPtr& scan) {
     auto rest = std::make_shared<LidarScan>(*scan);
     RandomStream random(static_cast<std::uint64_t>(scan->stamp), "loss");
     std::erase_if(rest->points, [&](const LidarPoint&) { return random.uniform() < 0.2; });
     return rest;
   };
-  EXPECT_LT(worst_error(forest(), fly(forest(), defaults(), 20'000'000, thinned)), 0.03);
+  EXPECT_LT(worst_error(forest(), fly(forest(), defaults(), 20'000'000, downsampled)), 0.03);
 }
 
 TEST(LidarInertialOdometry, SurvivesABurstOfFalseReturns) {

@@ -1,4 +1,4 @@
-#include "odometry/navigation_state.h"
+#include "odometry/inertial/navigation_state.h"
 
 #include <gtest/gtest.h>
 

@@ -80,11 +80,11 @@ TEST(Thin, KeepsTheFirstPointOfEveryCell) {
     const auto c = (point.p_L / 0.5F).array().floor().cast<int>().eval();
     if (cells.insert({c.x(), c.y(), c.z()}).second) expected.push_back(point.index);
   }
-  const auto kept = thin(points, 0.5, 100000);
+  const auto kept = voxel_downsample(points, 0.5, 100000);
   ASSERT_EQ(kept.size(), expected.size());
   for (std::size_t i = 0; i < kept.size(); ++i) EXPECT_EQ(kept[i].index, expected[i]);
-  EXPECT_EQ(thin(points, 0.5, 500).size(), 500U);
-  EXPECT_TRUE(thin({}, 0.5, 500).empty());
+  EXPECT_EQ(voxel_downsample(points, 0.5, 500).size(), 500U);
+  EXPECT_TRUE(voxel_downsample({}, 0.5, 500).empty());
 }
 
 /// A corner of three walls (or a single one), a vehicle 2 m off each.

@@ -88,7 +88,7 @@ TEST(ReplanMachine, FliesThroughPillarsContinuously) {
     machine.set_target(drawn.goal, {}, flight.now_);
     flight.run(grid, 60);
     EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
-    EXPECT_GT(machine.plans(), 3);
+    EXPECT_GT(machine.counts().plans, 3);
     EXPECT_FALSE(flight.touched_);
     EXPECT_LT((flight.last_.p_OB - drawn.goal).norm(), 0.3);
     EXPECT_LT(flight.p_jump_, 1e-3);

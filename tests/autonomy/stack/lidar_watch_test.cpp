@@ -39,12 +39,7 @@ LidarScan make_scan(Stamp end, const Flaws& flaws, double clutter, RandomStream&
   return scan;
 }
 
-RegistrationReport matched(int matched, int points) {
-  RegistrationReport report;
-  report.points = points;
-  report.matched = matched;
-  return report;
-}
+double matched(int matched, int points) { return static_cast<double>(matched) / points; }
 
 /// Flies a watch: what it tells, with the frame at which it does.
 class Watching {
@@ -53,11 +48,11 @@ class Watching {
     for (int i = 0; i < 25; ++i) frame({}, matched(1400, 1500));
     EXPECT_EQ(told_, "");
   }
-  void frame(const Flaws& flaws, const RegistrationReport& report) {
+  void frame(const Flaws& flaws, double matched_share) {
     now_ += kFrame;
     const double clutter = 0.04 + 0.02 * std::sin(0.3 * static_cast<double>(frame_));
     watch_.add_scan(now_, make_scan(now_, flaws, clutter, random_));
-    watch_.add_registration(report);
+    watch_.add_matched_share(matched_share);
     update();
   }
   void empty_frame() {  // the device still sends frames, with nothing in them

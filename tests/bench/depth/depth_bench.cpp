@@ -30,7 +30,7 @@ Vec3 stand(const worlds::World& world, double x, double y) {
 
 int main(int argc, char** argv) {
   const int frames = argc > 1 ? std::atoi(argv[1]) : 100;
-  const worlds::World world = worlds::build_forest({}, 1);
+  const worlds::World world = worlds::build({}, 1);
   const sim::D430Config config{};
   const Pose X_BC = VehicleConfig{}.X_BC();
   sim::D430 device(config, world, X_BC, 1);

@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "autonomy/exploration/test_map.h"
-#include "exploration/explorer.h"
+#include "exploration/revenue_explorer.h"
 
 namespace arex {
 namespace {
@@ -47,7 +47,7 @@ void bench(std::uint64_t seed) {
   FrontierDetector detector(config.detector, seed);
   const double detector_ms = best_ms(20, [&] { detector.update(space); });
   const double search_ms = best_ms(20, [&] { (void)find_frontiers(space); });
-  Explorer explorer(config, map.resolution, seed);
+  RevenueExplorer explorer(config, map.resolution, seed);
   std::size_t candidates = 0;
   double decide_ms = 1e9, worst_ms = 0;
   input.progress = TargetProgress::kReached;  // a new choice each time

@@ -108,7 +108,7 @@ struct Variant {
 }  // namespace
 
 int main() {
-  const worlds::World world = worlds::build_forest(worlds::ForestRecipe{}, 1);
+  const worlds::World world = worlds::build(worlds::ForestRecipe{}, 1);
   const double before = cpu_seconds();
   const Scene scene(world);
   std::printf("%zu triangles, %.2f s to build the scene\n", world.mesh.triangles.size(),

@@ -44,7 +44,7 @@ Truth truth_at(const worlds::World& world, Stamp stamp) {
 /// Scans with every point placed by its own true pose, rays from the frame's middle: OctoMap takes
 /// one origin.
 std::vector<RegisteredScan> record() {
-  const worlds::World world = worlds::build_forest(worlds::ForestRecipe{}, 1);
+  const worlds::World world = worlds::build(worlds::ForestRecipe{}, 1);
   const Scene scene(world);
   const VehicleConfig vehicle;
   const Pose X_BL = vehicle.X_BL();

@@ -17,7 +17,7 @@ namespace {
 constexpr double kRest = 3.0;
 constexpr double kKnot = 0.8;
 constexpr double kSpinUp = 2.5;         // rotors turn from here on
-constexpr double kHoverSpeed = 716;     // rad/s (reference.md, 1)
+constexpr double kHoverSpeed = 716;     // rad/s, at hover
 constexpr double kGroundOffset = 0.14;  // B above the pad
 
 /// Control points along a polyline at constant speed, the yaw along it.

@@ -1,4 +1,4 @@
-/// Random pillar fields of reference.md, section 10: success, limits and time of the local planner.
+/// Random pillar fields (support/pillar_field.h): success, limits and time of the local planner.
 ///
 ///     planner_bench [cases per setting] [seed] [folder]
 ///
@@ -20,7 +20,7 @@
 #include <string_view>
 #include <vector>
 
-#include "planning/local_planner.h"
+#include "planning/bspline_planner.h"
 #include "support/pillar_field.h"
 #include "support/unavoidable.h"
 
@@ -82,7 +82,7 @@ void run(int pillars, double inflation, bool cruise, int cases, std::uint64_t se
          const std::string& folder) {
   const bool verbose = !folder.empty();
   LocalPlannerConfig config;
-  LocalPlanner planner(config);
+  BsplinePlanner planner(config);
   GridAstar oracle;
   Tally tally;
   support::PillarFieldOptions options;

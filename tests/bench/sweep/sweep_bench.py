@@ -46,7 +46,7 @@ def one_by_one(binary, out):
 def main():
     binary = os.path.abspath(sys.argv[1])
     folder = tempfile.mkdtemp(prefix="arex-bench-")
-    short = {"mission.max_time_s": 0.2, "devices.lidar": "false", "odometry.source": "mocap",
+    short = {"mission.max_time_s": 0.2, "lidar.enabled": "false", "odometry.source": "mocap",
              "mapping.use_depth": "false"}
     runs = 24
     path = sweep_file(folder, "short", runs, short)

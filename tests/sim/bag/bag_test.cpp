@@ -97,7 +97,7 @@ TEST(BagWriter, NamesTheFileWhenTheDiskIsFullAtTheStart) {
   const TemporaryFolder folder;
   const auto file = folder / "flight.bag";
   const FileSizeLimit limit(0);
-  const std::string message = message_of([&] { BagWriter(file, VehicleConfig{}); });
+  const std::string message = message_of([&] { BagWriter(file, VehicleConfig{}).close(); });
   EXPECT_NE(message.find(file.string()), std::string::npos) << message;
   EXPECT_NE(message.find("File too large"), std::string::npos) << message;
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "run/bag_writer.h"
+#include "bag/bag_writer.h"
 
 /// A second of made-up measurements. check_bag.py knows the same formulas; all values are exact in
 /// binary, so that it can demand equality.
@@ -19,7 +19,7 @@ inline ImuSample imu_sample(int i) {
 }
 
 inline LidarScan lidar_scan(int i) {
-  LidarScan scan{i * kScanPeriod, (i + 1) * kScanPeriod, {}};
+  LidarScan scan{"", i * kScanPeriod, (i + 1) * kScanPeriod, {}};
   // Never the same number twice; the last frame saw nothing.
   const int count = i + 1 == kScans ? 0 : kScanPoints - i;
   for (int k = 0; k < count; ++k) {
@@ -32,7 +32,7 @@ inline LidarScan lidar_scan(int i) {
 }
 
 inline DepthImage depth_image(int i) {
-  DepthImage image{i * kDepthPeriod, {8, 6, 4.5, 4.25, 3.5, 2.75}, {}};
+  DepthImage image{"", i * kDepthPeriod, {8, 6, 4.5, 4.25, 3.5, 2.75}, {}};
   for (int k = 0; k < 48; ++k) image.depth_m.push_back(k % 5 == i ? 0.0F : 0.125F * float(k + i));
   return image;
 }

@@ -32,7 +32,7 @@ Flown fly(const std::string& scenario, std::vector<std::string> overrides) {
         load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 1);
     simulation.record_to(recorder);
     while (simulation.tick()) {
-      const bool degenerate = simulation.stack().odometry().status == OdometryStatus::kDegenerate;
+      const bool degenerate = simulation.view().odometry.status == OdometryStatus::kDegenerate;
       if (degenerate) flown.degenerate_s += to_seconds(kNanosecondsPerTick);
     }
     flown.result = simulation.finish();

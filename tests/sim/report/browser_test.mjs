@@ -114,7 +114,42 @@ async function testWithoutScript(browser) {
     .every((e) => e.getBoundingClientRect().height > 0)`;
   assert.ok(await page.run(shown), 'something needs a script to be seen');
   assert.match(await page.run('document.body.innerText'), /need JavaScript/);
+  await assertNothingEmpty(page);
   await keep(page, 'run-noscript');
+  await page.close();
+
+  const sweep = await browser.open(address('sweep'), { script: false });
+  assert.equal(await sweep.run(`document.querySelectorAll('#runs tbody tr').length`), 24);
+  await assertNothingEmpty(sweep);
+  await keep(sweep, 'sweep-noscript');
+  await sweep.close();
+}
+
+/** Every heading has something below it. */
+async function assertNothingEmpty(page) {
+  const empty = await page.run(`[...document.querySelectorAll('h2')]
+    .filter((h) => !h.nextElementSibling || h.nextElementSibling.getBoundingClientRect().height === 0)
+    .map((h) => h.textContent)`);
+  assert.deepEqual(empty, []);
+}
+
+/** Two runs over each other: a curve each, both paths on one map. */
+async function testOverlay(browser) {
+  const page = await browser.open(address('.'), { width: 400 });
+  assert.equal(await page.run(`document.querySelectorAll('#coverage canvas').length`), 2);
+  const area = await page.picture('#coverage canvas');
+  assert.ok(area.share > 0.002, `the curves are blank: ${area.share}`);
+  const names = await page.run(`[...document.querySelectorAll('#coverage .chart:first-child .u-label')]
+    .slice(1).map((label) => label.textContent)`);
+  assert.deepEqual(names, ['seed 7, run', 'seed 7, old']);
+  await page.run(`(() => { const s = document.getElementById('quantity'); s.value = 'surface_fraction';
+    s.dispatchEvent(new Event('change')); })()`);
+  await page.until(`document.querySelector('#coverage h3')?.textContent === 'Coverage of the surface over time'`);
+  assert.equal(await page.run(`document.querySelectorAll('#paths svg').length`), 1);
+  assert.equal(await page.run(`document.querySelectorAll('#paths polyline').length`), 2);
+  await assertNothingEmpty(page);
+  await keep(page, 'overlay');
+  await assertSound(page, 400);
   await page.close();
 }
 
@@ -125,6 +160,15 @@ async function testPaper(browser) {
   if (process.env.KEEP) writeFileSync(join(process.env.KEEP, 'run.pdf'), pdf);
   const printed = await page.picture('#view .printed');
   assert.ok(printed.share > 0.02, 'the view is not on the paper');
+  // Across a sheet as well as along it, the bars of the host's time stay out of the events.
+  await page.call('Emulation.setEmulatedMedia', { media: 'print' });
+  for (const width of [718, 1047]) {
+    await page.call('Emulation.setDeviceMetricsOverride', { width, height: 900, deviceScaleFactor: 1, mobile: false });
+    const [bars, events] = await page.run(`[document.querySelector('.timing'), document.getElementById('events')]
+      .map((e) => (({ left, right, top, bottom }) => ({ left, right, top, bottom }))(e.getBoundingClientRect()))`);
+    assert.ok(bars.bottom <= events.top || bars.right <= events.left, `they overlap on ${width} pixels`);
+    assert.ok((await page.run('document.documentElement.scrollWidth')) <= width, 'the paper is too narrow');
+  }
   await assertSound(page, 1280);
   await page.close();
 }
@@ -218,12 +262,29 @@ async function testHypercube(browser) {
   await page.close();
 }
 
+/** Trajectories compared: a page that needs no script, on a phone and on paper. */
+async function testEvaluation(browser, width, dark) {
+  const page = await browser.open(address('evaluation'), { width, dark, script: false });
+  const shown = `[...document.querySelectorAll('#path-map polyline, .curves polyline, td')]
+    .every((e) => e.getBoundingClientRect().width > 0)`;
+  assert.ok(await page.run(shown), 'something is not to be seen');
+  assert.equal(await page.run(`document.querySelectorAll('.curves').length`), 6);
+  assert.match(await page.run('document.body.innerText'), /position error \(ATE\), RMSE, m\s+[\d.]+\s+0\s/);
+  const letters = await page.run(`document.querySelector('.curves text').getBoundingClientRect().height`);
+  assert.ok(letters > 9, `the charts' text is ${letters} pixels high`);
+  await keep(page, `evaluation-${width}-${dark ? 'dark' : 'light'}`);
+  assert.ok((await page.pdf()).length > 10_000);
+  await assertSound(page, width);
+  await page.close();
+}
+
 const browser = new Browser(chromium);
 try {
   execFileSync(fixture, [folder]);
   for (const [width, dark] of [[1280, false], [400, true]]) {
     await testRun(browser, width, dark);
     await testSweep(browser, width, dark);
+    await testEvaluation(browser, width, dark);
   }
   await testFailures(browser);
   await testHypercube(browser);
@@ -232,7 +293,8 @@ try {
   await testWithoutWebGl(browser);
   await testWithoutScript(browser);
   await testPaper(browser);
-  console.log('11 passed, 0 failed');
+  await testOverlay(browser);
+  console.log('14 passed, 0 failed');
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "config/config.h"
+#include "quantised_reader.h"
+#include "report/overlay.h"
 #include "report/run_record.h"
 #include "support/temporary_folder.h"
 #include "synthetic_run.h"
@@ -59,6 +62,102 @@ TEST(ComparisonReport, TitlesARunByWhatWasVaried) {
   EXPECT_TRUE(contains(html, "inflation_m 0.3, weight_direction 3, seed 2"));  // the collided one
 }
 
+TEST(ComparisonReport, TitlesTellEveryTwoRunsApart) {
+  ResultTable results;
+  results.keys = {"scenario", "variant", "lidar.rate_hz", "depth.rate_hz"};
+  results.table = parse_table(
+      "scenario,variant,lidar.rate_hz,depth.rate_hz,seed,failure,detail\n"
+      "a,,10,30,1,,\na,fast,20,30,1,,\nb,,10,15,1,,\nb,,10,15,1,,\n");
+  results.folders = {"w", "x", "y", "z"};
+  EXPECT_EQ(run_titles(results),
+            (std::vector<std::string>{"a, lidar.rate_hz 10, depth.rate_hz 30, seed 1",
+                                      "a, fast, lidar.rate_hz 20, depth.rate_hz 30, seed 1",
+                                      "b, lidar.rate_hz 10, depth.rate_hz 15, seed 1, y",
+                                      "b, lidar.rate_hz 10, depth.rate_hz 15, seed 1, z"}));
+  EXPECT_EQ(configuration_titles(results)[3], "b, lidar.rate_hz 10, depth.rate_hz 15");
+}
+
+TEST(ComparisonReport, FiguresAreNamedInWordsWithTheirUnits) {
+  ResultTable results;
+  results.table = parse_table(
+      "seed,failure,detail,odometries.oracle.ate_rmse_m,coverage.reachable_area_m2\n1,,,0.1,20\n");
+  results.folders = {"x"};
+  const auto figures = comparison_payload(results, ".")["figures"];
+  EXPECT_EQ(figures["odometries.oracle.ate_rmse_m"]["label"], "odometry error, RMS, oracle");
+  EXPECT_EQ(figures["coverage.reachable_area_m2"]["unit"], "m²");
+}
+
+// Two runs through one room and one through another: three curves, two maps.
+TEST(ComparisonReport, LaysRunsOverEachOther) {
+  const TemporaryFolder folder;
+  test::write_synthetic_run(folder / "a", {});
+  test::write_synthetic_run(folder / "b", {.duration_s = 20});
+  test::write_synthetic_run(folder / "c", {});
+  write_text(folder / "b/resolved.yaml", "seed: 7\nplanning:\n  inflation_m: 0.3\n");
+  write_text(folder / "c/resolved.yaml", "seed: 8\nplanning:\n  inflation_m: 0.5\n");
+  const ResultTable results = read_results({folder / "a", folder / "b", folder / "c"});
+  const Overlay overlay = overlay_of(results);
+  ASSERT_EQ(overlay.runs.size(), 3U);
+  EXPECT_EQ(overlay.groups.size(), 3U);
+  EXPECT_EQ(overlay.runs[0].world, overlay.runs[1].world);
+  EXPECT_NE(overlay.runs[0].world, overlay.runs[2].world);
+
+  const auto json = overlay_json(overlay);
+  EXPECT_EQ(json["axes"]["time_s"]["end"], 29);
+  const auto whole = test::read_quantised(json["runs"][0]["time_s"]["area_fraction"]);
+  const auto shorter = test::read_quantised(json["runs"][1]["time_s"]["area_fraction"]);
+  ASSERT_EQ(whole.size(), 400U);
+  ASSERT_EQ(shorter.size(), 400U);
+  EXPECT_TRUE(std::isnan(whole[0]));  // nothing was scored yet
+  EXPECT_NEAR(whole[399], 1 - std::exp(-4 * 29. / 30), 1e-4);
+  EXPECT_NEAR(shorter[200], 1 - std::exp(-4 * 14. / 20), 1e-4);  // at 14.5 s, that of 14 s
+  EXPECT_TRUE(std::isnan(shorter[399]));                         // it had landed long before
+
+  const std::string html = comparison_report_html(results, "runs", folder.path());
+  const std::size_t at = html.find("<section id=\"paths\">");
+  ASSERT_NE(at, std::string::npos);
+  const std::string paths = html.substr(at, html.find("</section>", at) - at);
+  const auto count = [&](const std::string& part) {
+    std::size_t n = 0;
+    for (std::size_t i = paths.find(part); i != std::string::npos; i = paths.find(part, i + 1)) ++n;
+    return n;
+  };
+  EXPECT_EQ(count("<svg "), 2U);
+  EXPECT_EQ(count("<image "), 2U);
+  EXPECT_EQ(count("<polyline class=\"run\" style=\"stroke:var(--line-"), 3U);
+}
+
+TEST(ComparisonReport, ColoursConfigurationsWhereRunsAreMany) {
+  const TemporaryFolder folder;
+  ResultTable results;
+  results.keys = {"k"};
+  results.table.columns = {"k", "seed", "failure", "detail"};
+  for (int i = 0; i < 80; ++i) {
+    const std::filesystem::path run = folder / std::to_string(i);
+    std::filesystem::create_directory(run);
+    write_text(run / "resolved.yaml", "seed: 1\n");
+    results.folders.push_back(run);
+    results.table.rows.push_back({std::to_string(i % 8), std::to_string(i), "", ""});
+  }
+  const Overlay overlay = overlay_of(results);
+  EXPECT_EQ(overlay.all_groups, 8U);
+  EXPECT_EQ(overlay.groups, (std::vector<std::string>{"k 0", "k 1", "k 2", "k 3", "k 4", "k 5"}));
+  EXPECT_EQ(overlay.runs.size(), 6 * 8U);
+  EXPECT_TRUE(overlaid_paths_html(results, overlay).empty());  // none has a path
+}
+
+TEST(ComparisonReport, TablesTheRunsWithoutAScript) {
+  const TemporaryFolder folder;
+  test::write_synthetic_sweep(folder.path());
+  const std::string html =
+      comparison_report_html(read_results({folder.path()}), "sweep", folder.path());
+  EXPECT_TRUE(contains(html,
+                       "<a href=\"./runs/0000000000000000/\">inflation_m 0.3, weight_direction 1, "
+                       "seed 1</a></td><td class=\"word\">succeeded</td>"));
+  EXPECT_TRUE(contains(html, "<th>area covered, %</th>"));
+  EXPECT_FALSE(contains(html, "</h2>\n</section>"));
+}
+
 ResultTable table_of(const std::string& csv) {
   ResultTable results;
   results.keys = {"scenario"};
@@ -92,7 +191,7 @@ TEST(ComparisonReport, OnlyAnOutcomeMakesASuccess) {
       "a,4,,,,\n");
   EXPECT_TRUE(contains(mixed, "<dt>succeeded</dt><dd>1<small>of 2 flown</small>")) << mixed;
   EXPECT_TRUE(contains(mixed, "<dt>without outcome</dt><dd>1</dd>"));
-  EXPECT_TRUE(contains(mixed, "<dt>Seeds</dt><dd>4</dd>"));
+  EXPECT_TRUE(contains(mixed, "<dt>seeds</dt><dd>4</dd>"));
   const std::string none = html("scenario,seed,failure,detail,outcome\na,1,missing,,\n");
   EXPECT_TRUE(contains(none, "<dt>succeeded</dt><dd>0<small>none was flown</small></dd>"));
   const std::string empty = html("scenario,seed,failure,detail,outcome\n");

@@ -1,12 +1,14 @@
 // Writes what the browser test opens: FOLDER/run, FOLDER/old (without the growth of its cloud) and
 // FOLDER/sweep, FOLDER/cube, FOLDER/few (half of one side failed) and FOLDER/none (all did), each
-// with its report.
+// with its report; FOLDER/report.html compares the two runs, FOLDER/evaluation/report.html two
+// estimates with the run's truth.
 
 #include <cstdio>
 #include <filesystem>
 
 #include "files/files.h"
 #include "report/comparison_report.h"
+#include "report/evaluation_report.h"
 #include "report/page.h"
 #include "report/run_report.h"
 #include "synthetic_run.h"
@@ -34,5 +36,15 @@ int main(int argc, char** argv) {
     write_atomically(sweep / "report.html",
                      comparison_report_html(read_results({sweep}), "Sweep", sweep));
   }
+  write_atomically(
+      folder / "report.html",
+      comparison_report_html(read_results({folder / "run", folder / "old"}), "Two runs", folder));
+  std::vector<Trajectory> estimates;
+  for (const char* name : {"estimate.tum", "truth.tum"}) {
+    estimates.push_back(read_trajectory(folder / "run" / name));
+  }
+  std::filesystem::create_directory(folder / "evaluation");
+  write_atomically(folder / "evaluation" / "report.html",
+                   evaluation_report_html(compare(estimates.back(), estimates, {})));
   return 0;
 }

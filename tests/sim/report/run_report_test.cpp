@@ -47,11 +47,11 @@ TEST(RunReport, ShowsEveryFigureWithItsUnitAndWhatItMeans) {
   RunRecord run = recorded(folder);
   const std::string html = run_report_html(run);
   // The main ones at the top, in words and units; why it stopped among them.
-  EXPECT_TRUE(contains(html, "<dt>why the exploration stopped</dt><dd>little_left</dd>"));
+  EXPECT_TRUE(contains(html, "<dt>why the exploration stopped</dt><dd>little left</dd>"));
   EXPECT_TRUE(contains(html, "<dt>odometry error, RMS</dt><dd>20 mm</dd>"));
   EXPECT_TRUE(contains(html, "<dt>distance flown</dt><dd>31.4 m</dd>"));
   EXPECT_FALSE(contains(html, "<dt>time to 95 % of the area</dt>"));  // it never got so far
-  for (const FigureInfo& figure : figure_list()) {
+  for (const FigureInfo& figure : figures_in(*run.summary)) {
     EXPECT_TRUE(contains(html, "<code>" + figure.column() + "</code>")) << figure.key;
   }
   EXPECT_TRUE(contains(html, "<td class=\"word\">landing error</td><td>–</td>"));
@@ -62,7 +62,9 @@ TEST(RunReport, ShowsEveryFigureWithItsUnitAndWhatItMeans) {
   EXPECT_TRUE(contains(exact, "<dt>area covered</dt><dd>&gt; 99.9 %</dd>"));
   EXPECT_TRUE(contains(exact, "<dt>distance flown</dt><dd>12346 m</dd>"));
   run.title = "inflation_m 0.3, seed 7";
-  EXPECT_TRUE(contains(run_report_html(run), "<h1>room: inflation_m 0.3, seed 7"));
+  EXPECT_TRUE(contains(run_report_html(run), "<h1>room, inflation_m 0.3, seed 7"));
+  run.title = "room, seed 7";  // scenarios were varied
+  EXPECT_TRUE(contains(run_report_html(run), "<h1>room, seed 7"));
 }
 
 TEST(RunReport, ListsWhatEachDecisionHadToChooseFrom) {
@@ -94,6 +96,15 @@ TEST(RunReport, NeedsNothingFromOutside) {
   EXPECT_FALSE(contains(html, "rel=\"stylesheet\""));
   EXPECT_FALSE(contains(html, "@import"));
   EXPECT_FALSE(contains(html, "url(http"));
+}
+
+// What only a script can fill has no heading of its own.
+TEST(RunReport, HasNoEmptySectionWithoutAScript) {
+  const TemporaryFolder folder;
+  const std::string html = run_report_html(recorded(folder));
+  EXPECT_TRUE(contains(html, "<section id=\"against-time\"></section>"));
+  EXPECT_FALSE(contains(html, "</h2>\n</section>"));
+  EXPECT_FALSE(contains(html, "Against time</h2>"));
 }
 
 TEST(RunReport, EscapesWhatTheRunSays) {
@@ -184,10 +195,10 @@ TEST(RunReport, PathsReadBackWithinAMillimetre) {
   ASSERT_EQ(x.size(), t.size());
   for (std::size_t i = 0; i < t.size(); ++i) {
     const auto nearest = std::min_element(
-        run.truth.begin(), run.truth.end(), [&](const StampedPose& a, const StampedPose& b) {
+        run.truth.begin(), run.truth.end(), [&](const TimedPose& a, const TimedPose& b) {
           return std::abs(a.time_s - t[i]) < std::abs(b.time_s - t[i]);
         });
-    ASSERT_NEAR(nearest->X_OB.p.x(), x[i], 1e-3);
+    ASSERT_NEAR(nearest->X.p.x(), x[i], 1e-3);
   }
   EXPECT_NEAR(t.back(), run.truth.back().time_s, 1e-6);
 }

@@ -42,18 +42,20 @@ void write_flight(Recorder& recorder, const SyntheticRun& run) {
   for (Stamp stamp = 0; stamp <= from_seconds(run.duration_s); stamp += 5'000'000) {
     const double t = to_seconds(stamp);
     const Pose X = helix(t, run.duration_s);
-    recorder.truth(stamp, X);
-    recorder.estimate(stamp, {X.R, X.p + Vec3(0.02 * std::sin(t), 0.001 * t, 0)});
-    if (stamp % 50'000'000 != 0) continue;
-    FlightRow row;
-    row.stamp = stamp;
-    row.speed_mps = 1 + 0.2 * std::sin(t);
-    row.odometry_error_m = 0.001 * t;
-    row.clearance_m = t < 2 ? kUnknown : 1.2 + std::sin(0.7 * t);
-    row.height_m = X.p.z();
-    row.battery_power_w = 240;
-    row.battery_fraction = 1 - 0.2 * t / run.duration_s;
-    recorder.flight(row);
+    FlightSample sample;
+    sample.truth_X_OB = X;
+    sample.estimate_X_OB = Pose{X.R, X.p + Vec3(0.02 * std::sin(t), 0.001 * t, 0)};
+    if (stamp % 50'000'000 == 0) {
+      FlightRow& row = sample.row.emplace();
+      row.stamp = stamp;
+      row.speed_mps = 1 + 0.2 * std::sin(t);
+      row.odometry_error_m = 0.001 * t;
+      row.clearance_m = t < 2 ? kUnknown : 1.2 + std::sin(0.7 * t);
+      row.height_m = X.p.z();
+      row.battery_power_w = 240;
+      row.battery_fraction = 1 - 0.2 * t / run.duration_s;
+    }
+    recorder.sample(stamp, sample);
   }
 }
 

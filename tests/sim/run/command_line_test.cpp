@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <map>
@@ -75,16 +76,26 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   EXPECT_EQ(run({}).exit_code, 2);
 }
 
+/// Processor time of the programs that ended so far: what a loaded host does not stretch.
+double cpu_of_children_s() {
+  rusage usage{};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
 // Exit code 2 and one printable line that names the option, within a second.
 void expect_option_refused(const std::vector<std::string>& arguments, const std::string& expected) {
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin_s = cpu_of_children_s();
   const Result result = run(arguments);
-  const auto took = std::chrono::steady_clock::now() - begin;
+  const double took_s = cpu_of_children_s() - begin_s;
   EXPECT_EQ(result.exit_code, 2) << expected;
   EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_LT(result.err.size(), 300u) << result.err;
-  EXPECT_LT(took, std::chrono::seconds(1)) << expected;
+  EXPECT_LT(took_s, 1) << expected;
   for (const char c : result.err) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20);
 }
 
@@ -362,7 +373,7 @@ TEST(CommandLine, SaysItsVersion) {
 std::vector<std::string> short_run(const TemporaryFolder& folder) {
   return {"run",   kWaypoints,
           "--set", "mission.max_time_s=0.1",
-          "--set", "devices.lidar=false",
+          "--set", "lidar.enabled=false",
           "--set", "odometry.source=mocap",
           "--set", "mapping.use_depth=false",
           "--out", (folder / "run").string()};
@@ -457,6 +468,73 @@ TEST(CommandLine, RenderRefusesWhatItCannotDraw) {
             name + "/truth.tum: holds no flight, expected two poses and more\n");
   std::filesystem::remove(folder / "resolved.yaml");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// A straight flight of 2 m with a step aside, and an estimate 0.1 m beside it.
+void write_flight(const TemporaryFolder& folder) {
+  std::string truth, estimate;
+  for (int i = 0; i <= 200; ++i) {
+    const std::string time_and_x = std::to_string(0.01 * i) + " " + std::to_string(0.01 * i);
+    const std::string z = i < 100 ? " 0" : " 1";
+    truth += time_and_x + " 0" + z + " 0 0 0 1\n";
+    estimate += time_and_x + " 0.1" + z + " 0 0 0 1\n";
+  }
+  std::filesystem::create_directory(folder / "run");
+  write_text(folder / "run/truth.tum", truth);
+  write_text(folder / "lio.tum", estimate);
+  write_text(folder / "vio.tum", truth);
+}
+
+TEST(CommandLine, EvaluatesEstimatesAgainstARunOrATrajectory) {
+  const TemporaryFolder folder;
+  write_flight(folder);
+  const std::string lio = (folder / "lio.tum").string(), vio = (folder / "vio.tum").string();
+  const std::string flown = (folder / "run").string(), out = (folder / "out").string();
+  const Result one = run({"evaluate", lio, flown, "--out", out});
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_NE(one.out.find("position error (ATE), RMSE, m"), std::string::npos) << one.out;
+  EXPECT_NE(one.out.find(out + "/evaluation.html\n"), std::string::npos) << one.out;
+  const auto json = nlohmann::json::parse(read_text(folder / "out/evaluation.json"));
+  const auto& estimate = json["estimates"][0];
+  EXPECT_EQ(estimate["matched"], 201);
+  EXPECT_NEAR(estimate["ate"]["translation_m"]["rmse"].get<double>(), 0.1, 1e-9);
+  EXPECT_EQ(json["options"]["delta_m"], (nlohmann::json{1.0, 10.0}));
+
+  const Result two = run(
+      {"evaluate", lio, vio, "--truth", flown, "--align", "se3", "--delta", "0.5,2", "--out", out});
+  EXPECT_EQ(two.exit_code, 0) << two.err;
+  const auto both = nlohmann::json::parse(read_text(folder / "out/evaluation.json"));
+  ASSERT_EQ(both["estimates"].size(), 2u);
+  EXPECT_NEAR(both["estimates"][0]["ate"]["translation_m"]["max"].get<double>(), 0, 1e-9);
+  EXPECT_EQ(both["estimates"][1]["name"], "vio");
+  EXPECT_EQ(both["options"]["delta_m"], (nlohmann::json{0.5, 2.0}));
+}
+
+TEST(CommandLine, EvaluateRefusesWhatItCannotCompareAndWritesNothing) {
+  const TemporaryFolder folder;
+  write_flight(folder);
+  write_text(folder / "late.tum", "100 0 0 0 0 0 0 1\n101 0 0 0 0 0 0 1\n");
+  write_text(folder / "open.txt", "1403636579763555584 1 2 3 1 0 0 0\n");
+  std::filesystem::create_directory(folder / "empty");
+  const std::string lio = (folder / "lio.tum").string(), flown = (folder / "run").string();
+  const auto expect = [&](std::vector<std::string> arguments, const std::string& expected) {
+    arguments.insert(arguments.begin(), "evaluate");
+    arguments.insert(arguments.end(), {"--out", (folder / "out").string()});
+    const Result result = run(arguments);
+    EXPECT_EQ(result.exit_code, 2) << expected;
+    EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  };
+  expect({lio}, "alone, expected estimates and behind them");
+  expect({lio, (folder / "empty").string()}, "/empty: holds no truth.tum, expected a run folder");
+  expect({(folder / "none.tum").string(), flown}, "/none.tum:1: cannot be read");
+  expect({(folder / "late.tum").string(), flown}, "/late.tum: 0 of 2 poses have a partner in");
+  expect({(folder / "open.txt").string(), flown}, "/open.txt:1: may be TUM or EuRoC");
+  expect({lio, flown, "--delta", "1,0"}, "--delta: is '0', expected metres above 0");
+  expect({lio, flown, "--align", "so3"}, "--align");
+  expect({lio, flown, "--max-time-difference", "nan"}, "--max-time-difference: is 'nan'");
+  expect({lio, flown, "--alignn", "se3"}, "did you mean '--align'?");
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ TEST(FiguresOfAFlight, TheTrackingErrorStopsWhereItBeginsToLand) {
 TEST(FiguresOfAFlight, WhatNeverLandedHasNoLandingError) {
   // Still in the air, its target reached; and before anything happened.
   const Flown landing = fly(hop(), [](const Simulation& simulation) {
-    return simulation.stack().mission().state() == MissionState::kLand;
+    return simulation.view().state == MissionState::kLand;
   });
   ASSERT_EQ(landing.summary["outcome"], "interrupted");
   ASSERT_EQ(landing.summary["targets"].size(), 1U);

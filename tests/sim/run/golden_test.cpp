@@ -28,10 +28,14 @@ constexpr bool kOptimised = false;
 
 ordered_json hashes_of(const Simulation& simulation) {
   // In the order of cause and effect within a tick.
-  const DeviceHashes devices = simulation.device_hashes();
-  return {{"imu", devices.imu},
-          {"lidar", devices.lidar},
-          {"depth", devices.depth},
+  const std::map<std::string, std::string> devices = simulation.device_hashes();
+  const auto of = [&](const char* name) {
+    const auto found = devices.find(name);
+    return found == devices.end() ? Fingerprint().text() : found->second;
+  };
+  return {{"imu", of("imu")},
+          {"lidar", of("lidar")},
+          {"depth", of("depth")},
           {"trajectory", simulation.trajectory_hash()}};
 }
 

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "run/trajectory_hash.h"
+#include "math/fingerprint.h"
 #include "support/process.h"
 #include "support/temporary_folder.h"
 
@@ -82,7 +82,7 @@ TEST(Hosts, AGarageIsFlownTheSameOnAll) {
 std::string libm_answers() {
   void* libm = dlopen("libm.so.6", RTLD_NOW);
   if (libm == nullptr) return "no libm";
-  sim::TrajectoryHash hash;
+  Fingerprint hash;
   for (const char* name : {"sin", "exp", "log", "tan", "atan"}) {
     auto* function = reinterpret_cast<double (*)(double)>(dlsym(libm, name));
     if (function == nullptr) return std::string("no ") + name;

@@ -24,7 +24,7 @@ constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
 constexpr const char* kHop =
     "world: {kind: forest, forest: {size_m: [20, 20], tree_density_per_m2: 0.02}}\n"
     "mission: {kind: waypoints, waypoints_m: [[1, 0, 1]], max_time_s: 0.2}\n"
-    "devices: {lidar: false}\nodometry: {source: mocap}\nmapping: {use_depth: false}\n";
+    "lidar: {enabled: false}\nodometry: {source: mocap}\nmapping: {use_depth: false}\n";
 
 /// A folder with hop.yaml in it, which is also where the program is started.
 class RunOutputs : public ::testing::Test {

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "run/trajectory_hash.h"
+#include "math/fingerprint.h"
 #include "support/temporary_folder.h"
 
 namespace arex::sim {
@@ -18,7 +18,9 @@ TEST(Recorder, WritesTumRowsThatReadBack) {
   const Pose X{so3::Exp({0.1, -0.2, 0.3}), {1, -2, 3}};
   {
     Recorder recorder(folder / "run", "seed: 1\n");
-    recorder.truth(1'234'567'890, X);
+    FlightSample sample;
+    sample.truth_X_OB = X;
+    recorder.sample(1'234'567'890, sample);
     recorder.flush();
   }
   std::istringstream lines(read_text(folder / "run/truth.tum"));
@@ -73,10 +75,10 @@ TEST(Recorder, SaysWhichFileCannotBeWritten) {
   EXPECT_THROW(Recorder(folder / "file", ""), std::runtime_error);
 }
 
-TEST(TrajectoryHash, ChangesWithEveryBitAndWithTheOrder) {
+TEST(Fingerprint, ChangesWithEveryBitAndWithTheOrder) {
   const std::vector<double> values{0.1, 0.2, 0.3};
   auto hash_of = [](std::span<const double> v) {
-    TrajectoryHash hash;
+    Fingerprint hash;
     hash.add(v);
     return hash.text();
   };

@@ -77,5 +77,40 @@ TEST(Stuck, AGoalInAWallIsGivenUpAndTheRestFlown) {
   EXPECT_LT(to_seconds(result.duration), 75);
 }
 
+/// Flies to a goal on an oracle whose origin jumps aside on the way. @return the fastest true speed
+/// within two seconds after it.
+double speed_after_jump(const std::vector<std::string>& more, FlightResult& result) {
+  const test::TemporaryFolder folder;
+  test::write_text(folder / "jump.yaml", R"(
+world:
+  kind: forest
+  forest:
+    size_m: [40, 26]
+    corridors: [{points_m: [[0, 0], [14, 0]], width_m: 5}]
+mission: {kind: goals, waypoints_m: [[14, 0, 1.5]], max_time_s: 60}
+mocap: {fault_jump_from_s: 9, fault_jump_m: [-1.0, 1.5, 0]}
+)");
+  std::vector<std::string> overrides = kFast;
+  overrides.insert(overrides.end(), more.begin(), more.end());
+  Simulation simulation(load_scenario(folder / "jump.yaml", overrides, 1), 2);
+  double fastest = 0;
+  while (simulation.tick()) {
+    const double t = to_seconds(simulation.now());
+    if (t > 9 && t < 11) fastest = std::max(fastest, simulation.truth().v_WB.norm());
+  }
+  result = simulation.finish();
+  return fastest;
+}
+
+TEST(Jump, TheMapAroundAndTheWayThroughItBeginAnew) {
+  FlightResult result;
+  const double heeded = speed_after_jump({}, result);
+  EXPECT_EQ(result.outcome, Outcome::kSucceeded) << result.reason;
+  EXPECT_EQ(result.collisions, 0);
+  EXPECT_LT(heeded, 2.2);  // planning.max_speed_mps is 2
+  // What the same jump does to a stack that takes no notice: it lurches to where the plan now lies.
+  EXPECT_GT(speed_after_jump({"odometry.jump_m=100"}, result), heeded + 0.5);
+}
+
 }  // namespace
 }  // namespace arex::sim

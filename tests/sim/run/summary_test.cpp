@@ -40,8 +40,8 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
   result.map.emplace();
   result.coverage.emplace();
   result.flight.thin.emplace();
-  result.plans = 1;
-  result.timing = {summarise("replan", std::vector<float>())};
+  result.plans.plans = 1;
+  result.timing = {timing_row("replan", std::vector<float>())};
   std::set<std::string> counts{"map.points",
                                "map.scored",
                                "map.foliage",
@@ -50,7 +50,12 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
                                "thin.branches",
                                "thin.seen_in_time",
                                "planner.replans",
-                               "planner.failures"};
+                               "planner.failures",
+                               "planner.retimed",
+                               "planner.slowed"};
+  for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
+    counts.insert("planner.stages." + std::string(kPlanStageNames[stage]));
+  }
   counts.insert(expected.begin(), expected.end());
   EXPECT_EQ(with_value(summarise(scenario, result, {1, 1})), counts);
 }
@@ -66,8 +71,8 @@ TEST(Summary, HasEveryFigureOfTheListAndNoOther) {
 
 TEST(Summary, AModuleThatNeverRanHasNoTime) {
   EXPECT_EQ(
-      timing_csv(
-          {summarise("depth", std::vector<float>()), summarise("imu", std::vector<float>{0.001F})}),
+      timing_csv({timing_row("depth", std::vector<float>()),
+                  timing_row("imu", std::vector<float>{0.001F})}),
       "module,calls,median_ms,p99_ms,total_s\ndepth,0,,,0.0000\nimu,1,1.0000,1.0000,0.0010\n");
 }
 

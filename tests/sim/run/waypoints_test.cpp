@@ -24,7 +24,7 @@ void expect_good_flight(const FlightResult& result, std::uint64_t seed) {
 }
 
 // What the sensors see does not matter on the oracle's pose: only the flight itself is flown here.
-const std::vector<std::string> kFlightOnly{"odometry.source=mocap", "devices.lidar=false",
+const std::vector<std::string> kFlightOnly{"odometry.source=mocap", "lidar.enabled=false",
                                            "mapping.use_depth=false"};
 
 TEST(Waypoints, AreFlownInTenForestsInCalmAir) {

@@ -77,5 +77,33 @@ TEST(Csv, ACellWithoutAMeasurementIsEmpty) {
   EXPECT_THROW(csv_header("nothing.csv"), std::logic_error);
 }
 
+TEST(Figures, ThoseOfNamedThingsAreKnownByAnyName) {
+  const FigureInfo* figure = find_figure("odometries.vio.ate_rmse_m");
+  ASSERT_NE(figure, nullptr);
+  EXPECT_EQ(figure->key, "odometries.NAME.ate_rmse_m");
+  EXPECT_EQ(figure->named("vio").key, "odometries.vio.ate_rmse_m");
+  EXPECT_EQ(find_figure("odometries.vio.no_figure"), nullptr);
+  EXPECT_EQ(find_figure("odometries.a.b.ate_rmse_m"), nullptr);
+  EXPECT_EQ(find_figure("odometries..ate_rmse_m"), nullptr);
+  Figures figures;
+  figures.set("odometries.vio.ate_rmse_m", 0.25);
+  figures.set("odometries.twin.lost_s", 1.5);
+  figures.set("device_hashes.lidar", "1");
+  figures.set("device_hashes.rear", "2");
+  const auto json = figures.json();
+  EXPECT_EQ(json["odometries"].size(), 2U);
+  EXPECT_EQ(json["odometries"]["vio"]["ate_rmse_m"], 0.25);
+  EXPECT_EQ(json["device_hashes"]["rear"], "2");
+  EXPECT_EQ(Figures().json()["odometries"], nullptr);
+  int named = 0, lidar = 0;
+  for (const FigureInfo& info : figures_in(json)) {
+    named += info.key == "odometries.vio.ate_rmse_m";
+    lidar += info.key == "device_hashes.lidar";
+    EXPECT_FALSE(info.is_named()) << info.key;
+  }
+  EXPECT_EQ(named, 1);
+  EXPECT_EQ(lidar, 1);
+}
+
 }  // namespace
 }  // namespace arex::sim

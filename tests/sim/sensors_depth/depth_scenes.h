@@ -45,7 +45,7 @@ inline worlds::World small_forest(std::uint64_t seed) {
   worlds::ForestRecipe recipe;
   recipe.size_m = {24, 20};
   recipe.edge_m = 1;
-  return worlds::build_forest(recipe, seed);
+  return worlds::build(recipe, seed);
 }
 
 /// A pose of B in flight over `world`'s terrain: any heading, tilted by up to 20 degrees.

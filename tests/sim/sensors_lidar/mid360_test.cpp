@@ -13,6 +13,8 @@ namespace arex::sim {
 namespace {
 
 using test::rest;
+using test::room;
+using test::to_wall;
 using test::WorldMaker;
 using worlds::CollisionShape;
 
@@ -20,19 +22,6 @@ Mid360Config exact() {
   Mid360Config config;
   config.noise_free = true;
   return config;
-}
-
-const Vec3 kRoomHalf(9, 7, 5);
-
-worlds::World room() { return WorldMaker().object(0.6F).box(Pose{}, kRoomHalf).world(); }
-
-/// Distance along a ray from inside the room to its walls.
-double to_wall(const Vec3& o, const Vec3& d) {
-  double best = 1e9;
-  for (int i = 0; i < 3; ++i) {
-    if (d[i] != 0) best = std::min(best, (std::copysign(kRoomHalf[i], d[i]) - o[i]) / d[i]);
-  }
-  return best;
 }
 
 std::int64_t firing_of(const LidarScan& scan, const LidarPoint& point) {

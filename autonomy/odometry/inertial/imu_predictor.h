@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "messages/estimates.h"
+#include "odometry/inertial/gyro_clipping.h"
+#include "odometry/inertial/navigation_state.h"
+
+namespace arex {
+
+/// The 200 Hz output: every IMU sample integrated by the midpoint from the newest scan update
+/// (paper, eqs. (5)-(9)). An update that arrives late is anchored at its own time and the samples
+/// since are integrated again.
+class ImuPredictor {
+ public:
+  void add(const ImuSample& imu);
+  /// Starts anew from the state at `stamp`.
+  void anchor(Stamp stamp, const NavigationState& state, double accel_scale,
+              const GyroCompletion& completion);
+
+  /// The state at `stamp`, the newest sample held if that lies behind; nothing before the first
+  /// anchor.
+  [[nodiscard]] std::optional<NavigationState> at(Stamp stamp) const;
+
+ private:
+  void advance(Stamp to);
+  [[nodiscard]] NavigationState integrate(Stamp to) const;
+
+  std::vector<ImuSample> samples_;  ///< from one at or before the anchor on
+  std::optional<NavigationState> head_;
+  Stamp head_stamp_ = 0;
+  double accel_scale_ = 1;
+  GyroCompletion completion_;
+};
+
+}  // namespace arex

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "messages/odometry_need.h"
+#include "odometry/inertial/imu_buffer.h"
+#include "odometry/inertial/inertial_config.h"
+#include "odometry/inertial/navigation_state.h"
+
+namespace arex {
+
+/// Densities of the white noise in the readings of a standing IMU.
+struct WhiteNoise {
+  double gyro = 0;   ///< rad/s/sqrt(Hz)
+  double accel = 0;  ///< m/s^2/sqrt(Hz)
+};
+
+/// Mean and scatter of IMU readings.
+struct ImuMoments {
+  Vec3 gyro_mean = Vec3::Zero();   ///< rad/s
+  Vec3 accel_mean = Vec3::Zero();  ///< m/s^2
+  double gyro_std = 0;             ///< of one sample, the largest axis
+  double accel_std = 0;
+};
+[[nodiscard]] ImuMoments moments(std::span<const ImuSample> samples);
+
+/// A window of standstill.
+struct Standstill {
+  Stamp stamp = 0;          ///< of its last sample
+  std::size_t samples = 0;  ///< averaged
+  ImuMoments moments;
+  WhiteNoise white_noise;
+};
+
+/// What keeps the samples from being a window of standstill; kNothing: they are one.
+/// @param samples the newest last.
+[[nodiscard]] OdometryNeed missing_for_start(std::span<const ImuSample> samples,
+                                             const StaticInitialiserConfig& config);
+
+/// Averages the newest window of standstill; nothing while the samples are none.
+/// @param samples the newest last.
+[[nodiscard]] std::optional<Standstill> measure_standstill(std::span<const ImuSample> samples,
+                                                           const StaticInitialiserConfig& config);
+
+/// Roll and pitch that turn the specific force f_B to z; yaw zero.
+[[nodiscard]] Mat3 level(const Vec3& f_B);
+
+/// Whether the samples, those between two corrections, are those of a vehicle that still stands as
+/// in `x`: no vibration, no rate, no other specific force.
+[[nodiscard]] bool stands_still(std::span<const ImuSample> samples, const NavigationState& x,
+                                double accel_scale, const StaticInitialiserConfig& config,
+                                const WhiteNoise& noise);
+
+/// By the Allan deviation over blocks of a few samples, all axes alike: the filters of the sensor,
+/// which correlate neighbours, and its bias, which moves slowly, leave it alone.
+///
+/// @pre the vehicle stands; @returns zeros for too few samples.
+[[nodiscard]] WhiteNoise white_noise(std::span<const ImuSample> samples);
+
+/// The configured noise for an IMU with this white noise. Where it is noisier than configured it is
+/// of a worse grade, and its bias, which standing for a second cannot tell, walks in proportion.
+[[nodiscard]] ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured);
+
+}  // namespace arex

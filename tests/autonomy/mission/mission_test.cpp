@@ -1,0 +1,369 @@
+#include "mission/mission.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace arex {
+namespace {
+
+/// A vehicle that is wherever its last request asks it to be.
+class Pilot {
+ public:
+  explicit Pilot(const MissionConfig& config)
+      : mission(config, [this](EventKind kind, const std::string& detail) {
+          if (kind == EventKind::kMissionState) states.push_back(detail);
+          if (kind == EventKind::kRecovery || kind == EventKind::kStuck) troubles.push_back(detail);
+        }) {}
+
+  /// Obeys for so many seconds, 50 steps a second.
+  void fly(double seconds) {
+    for (int k = 0; k < seconds * 50; ++k) step();
+  }
+
+  void step() {
+    now += kNanosecondsPerSecond / 50;
+    Mission::Inputs inputs;
+    inputs.now = now;
+    inputs.odometry.status = OdometryStatus::kOk;
+    inputs.odometry.X_OB.p = p_O;
+    inputs.autopilot_ready = true;
+    inputs.armed = armed;
+    const bool navigates = served == request && request.kind == MotionRequest::Kind::kGoTo;
+    inputs.progress = navigates ? progress : MotionProgress::kUnderWay;
+    inputs.cause = "no_path";
+    inputs.below = below;
+    if (mission.landing_query()) {
+      queries.push_back(*mission.landing_query());
+      mission.answer(places.empty() ? std::nullopt : std::optional(places.front()));
+      if (!places.empty()) places.erase(places.begin());
+    }
+    request = mission.update(inputs);
+    served = request;
+    armed = request.kind != MotionRequest::Kind::kNone;
+    if (request.kind == MotionRequest::Kind::kLand) {
+      landed_at = p_O.head<2>();
+      armed = false;
+    } else if (progress != MotionProgress::kFailed) {
+      p_O = request.goal_O;
+    }
+  }
+
+  void decide(const Decision& decision) { mission.decide(decision); }
+
+  Stamp now = 0;
+  Vec3 p_O = Vec3::Zero();
+  bool armed = false;
+  MotionRequest request, served;
+  MotionProgress progress = MotionProgress::kArrived;
+  Vec2 landed_at = Vec2::Constant(1e9);
+  LandingGround below = LandingGround::kClear;  ///< where it would come down
+  std::vector<LandingPlace> places;             ///< answers, in order
+  std::vector<LandingQuery> queries;
+  std::vector<std::string> states, troubles;
+  Mission mission;
+};
+
+MissionConfig exploration(bool land_at_start) {
+  MissionConfig config;
+  config.kind = MissionConfig::Kind::kExplore;
+  config.land_at_start = land_at_start;
+  config.entry_m = {{5, 0, 1.5}};
+  return config;
+}
+
+Decision target(const Vec3& goal_O, int sequence) {
+  Decision decision;
+  decision.kind = DecisionKind::kNewTarget;
+  decision.sequence = sequence;
+  decision.goal_O = goal_O;
+  return decision;
+}
+
+Decision stop() {
+  Decision decision;
+  decision.kind = DecisionKind::kStop;
+  decision.stop_reason = StopReason::kNoCandidates;
+  return decision;
+}
+
+/// Takes off, enters, reaches one target and hears that this was all.
+void explore(Pilot& pilot, const Decision& last) {
+  pilot.fly(10);
+  ASSERT_EQ(pilot.mission.state(), MissionState::kExplore);
+  pilot.decide(target({20, 3, 1.5}, 7));
+  pilot.fly(1);
+  ASSERT_EQ(pilot.mission.target_progress(), TargetProgress::kReached);
+  ASSERT_EQ(pilot.p_O, Vec3(20, 3, 1.5));
+  pilot.decide(last);
+}
+
+TEST(Mission, ComesHomeToLand) {
+  Pilot pilot(exploration(true));
+  explore(pilot, stop());
+  pilot.fly(2);
+  EXPECT_EQ(pilot.landed_at, Vec2(0, 0));
+  EXPECT_EQ(pilot.states,
+            (std::vector<std::string>{"initialise", "takeoff", "entry", "explore",
+                                      "stop exploring: no_candidates", "return", "land", "done"}));
+  EXPECT_TRUE(pilot.mission.stuck().empty());
+}
+
+using PlaceKind = LandingPlace::Kind;
+
+TEST(Mission, LandsOnTheClearPlaceThatTheMapNames) {
+  Pilot pilot(exploration(false));
+  pilot.places = {{PlaceKind::kClear, {22, 4, 1.5}}};
+  explore(pilot, stop());
+  pilot.fly(2);
+  EXPECT_EQ(pilot.landed_at, Vec2(22, 4));
+  EXPECT_EQ(pilot.mission.state(), MissionState::kDone);
+  EXPECT_EQ(pilot.mission.targets().back().p_O, Vec3(22, 4, 1.5));
+  EXPECT_TRUE(pilot.mission.stuck().empty());
+}
+
+TEST(Mission, FliesOnWhereAPlaceTurnsOutNotToBeClear) {
+  Pilot pilot(exploration(false));
+  pilot.places = {{PlaceKind::kToBeSeen, {22, 4, 1.5}}, {PlaceKind::kClear, {30, 4, 1.5}}};
+  pilot.below = LandingGround::kObstructed;
+  explore(pilot, stop());
+  while (pilot.queries.size() < 2 && pilot.now < from_seconds(60)) pilot.step();
+  pilot.below = LandingGround::kClear;
+  pilot.fly(2);
+  EXPECT_EQ(pilot.landed_at, Vec2(30, 4));
+  ASSERT_EQ(pilot.queries.size(), 2u);
+  EXPECT_EQ(pilot.queries[1].tried, std::vector<Vec2>{Vec2(22, 4)});
+  EXPECT_TRUE(pilot.mission.stuck().empty());
+}
+
+TEST(Mission, SaysThatThereIsNoPlaceToLandAndTakesTheWidest) {
+  for (const bool any : {true, false}) {
+    Pilot pilot(exploration(false));
+    if (any) pilot.places = {{PlaceKind::kWidest, {22, 4, 1.5}}};
+    pilot.below = LandingGround::kObstructed;
+    explore(pilot, stop());
+    pilot.fly(2);
+    EXPECT_EQ(pilot.landed_at, any ? Vec2(22, 4) : Vec2(20, 3));
+    EXPECT_EQ(pilot.mission.stuck(), "no_landing_place");
+  }
+}
+
+TEST(Mission, LandsAtAClearPlaceWhenNoWayLeadsHome) {
+  MissionConfig config = exploration(true);
+  config.return_tries = 3;
+  Pilot pilot(config);
+  pilot.places = {{PlaceKind::kClear, {22, 4, 1.5}}};
+  explore(pilot, stop());
+  pilot.progress = MotionProgress::kFailed;
+  pilot.step();  // asks for the way
+  for (int attempt = 1; attempt < config.return_tries; ++attempt) {
+    pilot.step();
+    EXPECT_EQ(pilot.request.attempt, attempt);
+  }
+  pilot.step();
+  pilot.progress = MotionProgress::kArrived;
+  pilot.fly(1);
+  EXPECT_EQ(pilot.landed_at, Vec2(22, 4));
+  EXPECT_EQ(pilot.mission.stuck(), "no_path");  // home was asked for
+}
+
+TEST(Mission, TriesSoManyPlacesToLandAndThenTheWidest) {
+  MissionConfig config = exploration(false);
+  config.landing.tries = 3;
+  Pilot pilot(config);
+  for (int k = 0; k < 3; ++k) pilot.places.push_back({PlaceKind::kClear, {22.0 + 2 * k, 4, 1.5}});
+  explore(pilot, stop());
+  pilot.progress = MotionProgress::kFailed;
+  pilot.fly(2);
+  ASSERT_EQ(pilot.queries.size(), 4u);
+  EXPECT_FALSE(pilot.queries[2].last_resort);
+  EXPECT_TRUE(pilot.queries[3].last_resort);
+  EXPECT_EQ(pilot.queries[3].tried.size(), 3u);
+  EXPECT_EQ(pilot.mission.stuck(), "no_landing_place");
+}
+
+TEST(Mission, LandsWhereToldUnlessTheMapKnowsThatSomethingStandsThere) {
+  for (const auto kind : {MissionConfig::Kind::kWaypoints, MissionConfig::Kind::kGoals}) {
+    for (const auto below :
+         {LandingGround::kClear, LandingGround::kUnknown, LandingGround::kObstructed}) {
+      MissionConfig config;
+      config.kind = kind;
+      config.waypoints_m = {{5, 0, 1.5}, {9, 0, 1.5}};
+      Pilot pilot(config);
+      pilot.places = {{PlaceKind::kClear, {9, 3, 1.5}}};
+      pilot.below = below;
+      while (pilot.queries.empty() && pilot.now < from_seconds(30)) pilot.step();
+      pilot.below = LandingGround::kClear;
+      pilot.fly(2);
+      const bool moved = below == LandingGround::kObstructed;
+      EXPECT_EQ(pilot.landed_at, moved ? Vec2(9, 3) : Vec2(9, 0));
+      EXPECT_EQ(pilot.troubles.empty(), !moved);  // it says so
+    }
+  }
+}
+
+TEST(Mission, TellsTheExplorerOfATargetThatItCannotReach) {
+  Pilot pilot(exploration(false));
+  pilot.fly(10);
+  pilot.progress = MotionProgress::kFailed;
+  pilot.decide(target({20, 3, 1.5}, 1));
+  pilot.fly(1);
+  EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);
+  EXPECT_EQ(pilot.mission.target_progress(), TargetProgress::kUnreachable);
+  EXPECT_TRUE(pilot.mission.targets().empty());
+}
+
+/// A mission whose inputs the test sets: what it asks for, and how it ends.
+class Desk {
+ public:
+  explicit Desk(const MissionConfig& config)
+      : mission(config, [this](EventKind kind, const std::string& detail) {
+          if (kind == EventKind::kStuck) stuck.push_back(detail);
+          if (kind == EventKind::kTargetDropped) dropped.push_back(detail);
+        }) {
+    in.odometry.status = OdometryStatus::kOk;
+    in.need = OdometryNeed::kNothing;
+    in.autopilot_ready = true;
+  }
+  /// @param fly moves the vehicle once a step, as it likes
+  void run(double seconds, const std::function<void(Desk&)>& fly = {}) {
+    for (int k = 0; k < seconds * 50 && mission.state() != MissionState::kDone; ++k) {
+      in.now += kNanosecondsPerSecond / 50;
+      if (fly) fly(*this);
+      request = mission.update(in);
+    }
+  }
+  [[nodiscard]] double seconds() const { return to_seconds(in.now); }
+
+  Mission::Inputs in;
+  MotionRequest request;
+  std::vector<std::string> stuck, dropped;
+  Mission mission;
+};
+
+/// Arms when asked, and is where it is asked to be at once, unless that is beyond x = `fence_m`.
+std::function<void(Desk&)> pilot_until(double fence_m) {
+  return [fence_m](Desk& desk) {
+    using Kind = MotionRequest::Kind;
+    const Kind kind = desk.request.kind;
+    desk.in.armed = kind != Kind::kNone && kind != Kind::kLand;
+    if (kind == Kind::kTakeoff || kind == Kind::kLeg) {
+      if (desk.request.goal_O.x() <= fence_m) desk.in.odometry.X_OB.p = desk.request.goal_O;
+    }
+  };
+}
+
+MissionConfig waypoints(std::vector<Vec3> points) {
+  MissionConfig config;
+  config.waypoints_m = std::move(points);
+  return config;
+}
+
+TEST(Mission, NamesWhatItWaitedFor) {
+  const std::vector<std::pair<OdometryNeed, std::string>> needs{
+      {OdometryNeed::kGyroBias, "gyro_bias"},
+      {OdometryNeed::kScan, "no_scan"},
+      {OdometryNeed::kReference, "nothing_to_register"},
+      {OdometryNeed::kImu, "no_imu"}};
+  for (const auto& [need, name] : needs) {
+    Desk desk(waypoints({{1, 0, 1}}));
+    desk.in.odometry.status = OdometryStatus::kInitialising;
+    desk.in.need = need;
+    desk.run(100);
+    EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+    EXPECT_EQ(desk.mission.stuck(), "not_ready: " + name);
+    EXPECT_NEAR(desk.seconds(), 23, 0.1);  // settle_s and ready_timeout_s
+    EXPECT_EQ(desk.request.kind, MotionRequest::Kind::kNone);
+  }
+  Desk desk(waypoints({{1, 0, 1}}));
+  desk.in.autopilot_ready = false;
+  desk.run(100);
+  EXPECT_EQ(desk.mission.stuck(), "not_ready: autopilot");
+}
+
+TEST(Mission, TakesOffHoweverLateItIsReadyWithinItsTime) {
+  MissionConfig config = waypoints({{1, 0, 1}});
+  config.ready_timeout_s = 50;
+  Desk desk(config);
+  desk.in.odometry.status = OdometryStatus::kLost;
+  desk.in.need = OdometryNeed::kScan;
+  desk.run(45);
+  desk.in.odometry.status = OdometryStatus::kOk;
+  desk.run(60, pilot_until(100));
+  EXPECT_EQ(desk.mission.stuck(), "");
+  EXPECT_EQ(desk.mission.targets().size(), 1U);
+}
+
+TEST(Mission, GivesUpATakeOffThatDoesNotClimb) {
+  Desk grounded(waypoints({{1, 0, 1}}));
+  grounded.run(100);  // never armed
+  EXPECT_EQ(grounded.mission.stuck(), "takeoff: not armed");
+  EXPECT_LT(grounded.seconds(), 30);
+
+  Desk heavy(waypoints({{1, 0, 1}}));
+  heavy.run(100, [](Desk& desk) {
+    const auto kind = desk.request.kind;
+    desk.in.armed = kind == MotionRequest::Kind::kTakeoff ||
+                    (desk.in.armed && kind != MotionRequest::Kind::kLand);
+  });
+  EXPECT_EQ(heavy.mission.stuck(), "takeoff: height not reached");
+  EXPECT_EQ(heavy.mission.state(), MissionState::kDone);  // down again, disarmed
+}
+
+TEST(Mission, DropsALegThatItDoesNotGetOnAndFliesTheNext) {
+  Desk desk(waypoints({{1, 0, 1}, {9, 0, 1}, {0, 0, 1}}));
+  desk.run(200, pilot_until(5));
+  EXPECT_EQ(desk.mission.stuck(), "leg not reached");
+  EXPECT_EQ(desk.dropped, std::vector<std::string>{"9.00 0.00 1.00"});
+  EXPECT_EQ(desk.mission.targets().size(), 2U);
+  EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+  EXPECT_LT(desk.seconds(), 40);
+}
+
+TEST(Mission, ASlowLegIsNoStuckOne) {
+  Desk desk(waypoints({{9, 0, 1.5}}));
+  desk.run(1000, [](Desk& slow) {  // 10 mm/s, then a long hold
+    pilot_until(5)(slow);
+    if (slow.request.goal_O.x() < 5) return;
+    Vec3& p = slow.in.odometry.X_OB.p;
+    const Vec3 way = slow.request.goal_O - p;
+    p += way.normalized() * std::min(way.norm(), 0.01 / 50);
+  });
+  EXPECT_EQ(desk.mission.stuck(), "");
+  EXPECT_EQ(desk.mission.targets().size(), 1U);
+}
+
+TEST(Mission, ComesHomeWhenTheWayInIsBlocked) {
+  MissionConfig config = exploration(false);
+  config.entry_m = {{2, 0, 1.5}, {9, 0, 1.5}};
+  Desk desk(config);
+  desk.run(200, pilot_until(5));
+  EXPECT_EQ(desk.mission.stuck(), "entry: leg not reached");
+  ASSERT_EQ(desk.mission.state(), MissionState::kReturn);
+  EXPECT_EQ(desk.request.goal_O, Vec3(0, 0, 1.5));
+}
+
+TEST(Mission, ALandingThatDoesNotEndIsHandedToTheAutopilotAndThenNamed) {
+  Desk desk(waypoints({{1, 0, 1}}));
+  bool descended = false;
+  desk.run(200, [&](Desk& d) {
+    pilot_until(5)(d);
+    d.in.armed |= d.request.kind == MotionRequest::Kind::kLand;
+    descended |= d.request.kind == MotionRequest::Kind::kDescend;
+  });
+  EXPECT_TRUE(descended);
+  EXPECT_EQ(desk.mission.stuck(), "landing: not disarmed");
+  EXPECT_LT(desk.seconds(), 60);
+}
+
+TEST(Mission, AnExplorerThatNeverSpeaksIsNotWaitedForForEver) {
+  Desk desk(exploration(true));
+  desk.run(200, pilot_until(50));
+  EXPECT_EQ(desk.mission.stuck(), "no_map");
+  EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+}
+
+}  // namespace
+}  // namespace arex

@@ -46,8 +46,8 @@ Input input_of(const fs::path& given) {
   constexpr double kStep = 0.25;  // m, between points of the path
   Input input{given / "cloud.pcd", {}};
   for (const sim::TimedPose& pose : sim::read_tum(given / "estimate.tum")) {
-    if (input.path.empty() || (pose.X_OB.p - input.path.back()).norm() > kStep) {
-      input.path.push_back(pose.X_OB.p);
+    if (input.path.empty() || (pose.X.p - input.path.back()).norm() > kStep) {
+      input.path.push_back(pose.X.p);
     }
   }
   return input;

@@ -16,8 +16,8 @@
 #include "run/stage_timer.h"
 #include "scoring/flight_scorer.h"
 #include "scoring/map_error.h"
-#include "sensors/device.h"
 #include "scoring/semantic_score.h"
+#include "sensors/device.h"
 #include "sensors/scene.h"
 #include "stack/flight_software.h"
 

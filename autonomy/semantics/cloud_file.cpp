@@ -1,50 +1,20 @@
 #include "semantics/cloud_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
-#include <limits>
 #include <string>
 
+#include "clouds/cloud_fields.h"
+#include "clouds/pcd_reader.h"
+#include "clouds/ply_reader.h"
 #include "config/config.h"
 #include "files/files.h"
-#include "semantics/cloud_fields.h"
-#include "semantics/pcd_reader.h"
-#include "semantics/ply_reader.h"
 
 namespace arex {
-
-namespace cloud_fields {
-
-std::optional<double> parse_number(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::quiet_NaN();
-  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
-  return value;
-}
-
-std::string_view next_word(std::string_view& line) {
-  constexpr std::string_view kBlank = " \t\r\v\f";
-  line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
-  const std::string_view word = line.substr(0, line.find_first_of(kBlank));
-  line.remove_prefix(word.size());
-  return word;
-}
-
-std::string_view next_line(std::string_view& text) {
-  const std::size_t end = text.find('\n');
-  std::string_view line = text.substr(0, end);
-  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  return line;
-}
-
-}  // namespace cloud_fields
 
 namespace {
 
@@ -168,13 +138,12 @@ std::string objects_csv(const SemanticMap& map) {
       "seen_fraction,confidence\n";
   for (const SemanticObject& object : map.objects) {
     const Vec3 p = object.position + map.origin;
-    std::array<char, 256> line{};
-    std::snprintf(line.data(), line.size(),
-                  ",%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%.3f,%.2f,%.2f,%.3f\n", p.x(), p.y(), p.z(),
-                  object.size.x(), object.size.y(), object.size.z(), object.yaw_rad,
-                  object.base_z + map.origin.z(), object.canopy_diameter, object.seen_fraction,
-                  object.confidence);
-    csv += std::string(kSemanticClassNames[static_cast<std::size_t>(object.kind)]) + line.data();
+    csv += fmt::format(
+        "{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.4f},{:.3f},{:.2f},{:.2f},{:.3f}\n",
+        kSemanticClassNames[static_cast<std::size_t>(object.kind)], p.x(), p.y(), p.z(),
+        object.size.x(), object.size.y(), object.size.z(), object.yaw_rad,
+        object.base_z + map.origin.z(), object.canopy_diameter, object.seen_fraction,
+        object.confidence);
   }
   return csv;
 }

@@ -1,4 +1,4 @@
-#include "semantics/ply_reader.h"
+#include "clouds/ply_reader.h"
 
 #include <algorithm>
 #include <array>

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "clouds/cloud_fields.h"
 #include "math/types.h"
-#include "semantics/cloud_fields.h"
 
 namespace arex {
 

@@ -1,4 +1,4 @@
-#include "semantics/pcd_reader.h"
+#include "clouds/pcd_reader.h"
 
 #include <limits>
 #include <string>

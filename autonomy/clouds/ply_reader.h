@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "semantics/pcd_reader.h"
+#include "clouds/pcd_reader.h"
 
 namespace arex {
 

@@ -42,8 +42,11 @@ std::pair<Vec3f, Vec3f> extent_of(std::span<const Vec3f> input, double voxel_m) 
     low[static_cast<Eigen::Index>(i)] = *least;
     high[static_cast<Eigen::Index>(i)] = *most;
   }
+  // A picture of which hardly a cell is known costs as much as any.
+  const double most_cells =
+      std::min(WorkingCloud::kMostCells, 1e6 + 100 * static_cast<double>(values[0].size()));
   const auto fits = [&] {
-    return cells_of(low, high) <= WorkingCloud::kMostCells &&
+    return cells_of(low, high) <= most_cells &&
            static_cast<double>((high - low).maxCoeff()) / voxel_m < kDeepest;
   };
   if (fits()) return {low, high};
@@ -59,10 +62,12 @@ std::pair<Vec3f, Vec3f> extent_of(std::span<const Vec3f> input, double voxel_m) 
     high[axis] = std::min(high[axis], quantile(last - tail) + static_cast<float>(kMargin));
   }
   if (!fits()) {
-    throw ConfigError("the cloud spans " + std::to_string(std::lround(high.x() - low.x())) + " x " +
-                      std::to_string(std::lround(high.y() - low.y())) + " x " +
-                      std::to_string(std::lround(high.z() - low.z())) +
-                      " m, expected at most 1.28 km^2 from above and 20 km along an axis");
+    throw ConfigError(
+        "the cloud spans " + std::to_string(std::lround(high.x() - low.x())) + " x " +
+        std::to_string(std::lround(high.y() - low.y())) + " x " +
+        std::to_string(std::lround(high.z() - low.z())) + " m, expected at most " +
+        std::to_string(std::lround(most_cells * WorkingCloud::kCell * WorkingCloud::kCell)) +
+        " m^2 from above for so many points, and 20 km along an axis");
   }
   return {low, high};
 }

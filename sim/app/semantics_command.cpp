@@ -65,6 +65,16 @@ void print_result(const SemanticMap& map, const CloudFile& cloud, const fs::path
   }
 }
 
+/// The map; what is wrong with the cloud is said with its name.
+SemanticMap map_of(const CloudFile& cloud, const std::vector<Vec3f>& path,
+                   const SemanticConfig& config, const fs::path& file) {
+  try {
+    return build_semantic_map(cloud.points, path, config);
+  } catch (const ConfigError& problem) {
+    throw ConfigError(file.string() + ": " + problem.what());
+  }
+}
+
 }  // namespace
 
 int semantics(const SemanticsArguments& arguments) {
@@ -83,7 +93,7 @@ int semantics(const SemanticsArguments& arguments) {
   }
   sim::expect_different_files(files);
 
-  SemanticMap map = build_semantic_map(cloud.points, path, config);
+  SemanticMap map = map_of(cloud, path, config, input.cloud);
   map.origin = cloud.origin;
   write_semantic_pcd(folder.path() / "semantic.pcd", cloud, map);
   write_atomically(folder.path() / "objects.csv", objects_csv(map));

@@ -4,8 +4,8 @@
 #include <limits>
 #include <tuple>
 
-#include "semantics/forest.h"
-#include "semantics/garage.h"
+#include "semantics/forest_reading.h"
+#include "semantics/garage_reading.h"
 #include "semantics/planarity.h"
 #include "semantics/working_cloud.h"
 

@@ -1,4 +1,4 @@
-#include "semantics/garage.h"
+#include "semantics/garage_reading.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "semantics/forest.h"
+#include "semantics/forest_reading.h"
 
 #include <Eigen/LU>
 #include <algorithm>

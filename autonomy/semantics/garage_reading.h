@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "semantics/forest.h"
+#include "semantics/forest_reading.h"
 
 namespace arex {
 

@@ -1,7 +1,5 @@
 #include "semantics/semantic_picture.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -286,22 +284,6 @@ RgbImage draw_semantic_map(const SemanticMap& map, std::span<const Vec3f> path) 
   }
   draw_key(map, canvas);
   return std::move(canvas.image);
-}
-
-std::string png_bytes(const RgbImage& image) {
-  png_image png;
-  std::memset(&png, 0, sizeof(png));
-  png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
-  png.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
-  std::string bytes(size, '\0');
-  if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), 0, nullptr) == 0) {
-    throw std::runtime_error(std::string("PNG of the semantic map: ") + png.message);
-  }
-  bytes.resize(size);
-  return bytes;
 }
 
 }  // namespace arex

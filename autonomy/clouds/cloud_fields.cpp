@@ -4,7 +4,11 @@
 #include <charconv>
 #include <limits>
 
+#include "config/config.h"
+
 namespace arex::cloud_fields {
+
+void refuse(const std::string& what) { throw ConfigError(what); }
 
 std::optional<double> parse_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <string>
 #include <string_view>
 
 /// Numbers in the point files of others.
@@ -53,6 +54,9 @@ inline double number(const char* bytes, NumberType type, bool swapped) {
   }
   return 0;
 }
+
+/// @throws ConfigError always: "has ...", before which a file's reader puts the name.
+[[noreturn]] void refuse(const std::string& what);
 
 /// A number as text, `nan` and `inf` included; nothing if it is none.
 std::optional<double> parse_number(std::string_view word);

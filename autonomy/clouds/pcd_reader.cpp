@@ -13,11 +13,10 @@ using cloud_fields::next_line;
 using cloud_fields::next_word;
 using cloud_fields::NumberType;
 using cloud_fields::parse_number;
+using cloud_fields::refuse;
 
 constexpr std::size_t kMostFields = 4096;
 constexpr std::size_t kMostPoints = 400'000'000;
-
-[[noreturn]] void refuse(const std::string& what) { throw ConfigError(what); }
 
 std::vector<std::string_view> words_of(std::string_view line) {
   std::vector<std::string_view> words;

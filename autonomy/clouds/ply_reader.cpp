@@ -15,12 +15,11 @@ using cloud_fields::next_line;
 using cloud_fields::next_word;
 using cloud_fields::NumberType;
 using cloud_fields::parse_number;
+using cloud_fields::refuse;
 using cloud_fields::size_of;
 
 constexpr std::size_t kMostEntries = 4096;
 constexpr double kMostCount = 4e8;
-
-[[noreturn]] void refuse(const std::string& what) { throw ConfigError(what); }
 
 NumberType type_of(std::string_view word) {
   constexpr std::array<std::pair<std::string_view, NumberType>, 16> kNames{{

@@ -11,7 +11,7 @@ namespace {
 constexpr double kBin = 0.1;                            // m along the wall
 constexpr double kLow = 0.4, kHead = 1.75;              // m above the floor, within every door
 constexpr double kLintelLow = 2.3, kLintelHigh = 2.75;  // m above the floor
-constexpr double kLayer = 0.15;                         // m
+constexpr double kDoorLayer = 0.15;                     // m
 constexpr double kLeastOff = 0.025, kMostOff = 0.18;    // m, of a leaf from the wall's face
 constexpr double kLeastWidth = 0.75, kMostWidth = 3.0;  // m
 constexpr double kBehind = 1.5;                         // m, what is seen through an opening
@@ -29,7 +29,7 @@ struct Slice {
 enum class Look : std::uint8_t { kWall, kOut, kIn, kOpen, kUnknown };
 
 Look look_of(const Slice& slice) {
-  const int all = static_cast<int>((kHead - kLow) / kLayer);
+  const int all = static_cast<int>((kHead - kLow) / kDoorLayer);
   const int filled = std::popcount(slice.layers);
   if (filled <= all / 6 && slice.behind + slice.before >= 3) return Look::kOpen;
   if (filled < all / 2) return Look::kUnknown;
@@ -65,7 +65,7 @@ std::vector<Slice> slices_of(const WallFace& wall, const WorkingCloud& cloud,
           if (std::abs(offset) < kMostOff) {
             slice.offset_sum += offset;
             ++slice.near;
-            slice.layers |= 1U << static_cast<unsigned>((h - kLow) / kLayer);
+            slice.layers |= 1U << static_cast<unsigned>((h - kLow) / kDoorLayer);
           } else {
             ++(offset > 0 ? slice.before : slice.behind);
           }

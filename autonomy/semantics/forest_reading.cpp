@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kGroundThickness = 0.12;  // m, roughness and noise of the ground's points
 constexpr double kBark = 0.06;             // m, a stem's points lie this near to its surface
-constexpr double kStep = 0.25;             // m, of following a stem
+constexpr double kStemStep = 0.25;         // m, of following a stem
 constexpr double kBridge = 1.0;            // m, without points along a stem
 constexpr double kCrownReach = 4.0;        // m, from a stem to the points of its crown
 constexpr double kCrownBase = 1.5;         // m above the ground, of what counts as canopy
@@ -70,7 +70,7 @@ class StemFollower {
     std::vector<Vec2> points;
     index_.within(static_cast<float>(guess.x()), static_cast<float>(guess.y()),
                   static_cast<float>(radius + 0.15), [&](std::uint32_t i) {
-                    if (std::abs(static_cast<double>(heights_[i]) - h) > kStep) return;
+                    if (std::abs(static_cast<double>(heights_[i]) - h) > kStemStep) return;
                     points.emplace_back(cloud_.points[i].head<2>().cast<double>());
                   });
     if (points.size() < kFewest) return std::nullopt;
@@ -147,7 +147,7 @@ void label_stem(const std::vector<Ring>& rings, const ColumnIndex& index,
     index.within(static_cast<float>(ring.centre.x()), static_cast<float>(ring.centre.y()),
                  static_cast<float>(ring.radius + kBark), [&](std::uint32_t i) {
                    const double h = static_cast<double>(heights[i]);
-                   if (std::abs(h - ring.height) > 0.5 * kStep + 1e-6 || h < kGroundThickness) {
+                   if (std::abs(h - ring.height) > 0.5 * kStemStep + 1e-6 || h < kGroundThickness) {
                      return;
                    }
                    labels[i] = SemanticClass::kTrunk;
@@ -188,8 +188,9 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
   const StemFollower follower(cloud, index, heights);
   for (const StemEvidence& e : stems) {
     constexpr double kHighest = 60;
-    std::vector<Ring> rings = follower.follow(e.stem, kBreastHeight, kStep, kHighest);
-    const std::vector<Ring> down = follower.follow(e.stem, kBreastHeight - kStep, -kStep, 0);
+    std::vector<Ring> rings = follower.follow(e.stem, kBreastHeight, kStemStep, kHighest);
+    const std::vector<Ring> down =
+        follower.follow(e.stem, kBreastHeight - kStemStep, -kStemStep, 0);
     rings.insert(rings.end(), down.begin(), down.end());
     label_stem(rings, index, heights, reading.labels);
   }

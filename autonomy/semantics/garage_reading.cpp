@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "semantics/doors.h"
 #include "semantics/parked_cars.h"
@@ -14,8 +13,6 @@ namespace {
 
 constexpr double kOnSurface = 0.12;  // m, roughness and noise of a floor's or ceiling's points
 constexpr double kOnFace = 0.1;      // m, likewise of a wall's
-
-Vec2 flat(const Vec3f& p) { return p.head<2>().cast<double>(); }
 
 /// The lowest floor of each cell, its neighbours' where there is none.
 Raster ground_of(const WorkingCloud& cloud, const std::vector<LevelSurface>& surfaces) {
@@ -39,8 +36,8 @@ Raster ground_of(const WorkingCloud& cloud, const std::vector<LevelSurface>& sur
 class RampFinder {
  public:
   RampFinder(const std::vector<LevelSurface>& surfaces, const GarageConfig& config) {
-    const double least = config.ramp_slope_deg * std::numbers::pi / 180;
-    const double most = config.max_slope_deg * std::numbers::pi / 180;
+    const double least = to_radians(config.ramp_slope_deg);
+    const double most = to_radians(config.max_slope_deg);
     for (const LevelSurface& surface : surfaces) {
       masks_.emplace_back();
       if (surface.kind != LevelSurface::Kind::kFloor) continue;

@@ -5,19 +5,18 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <optional>
 
 namespace arex {
 namespace {
 
-constexpr double kCell = 0.25;   // m
-constexpr float kGap = 0.15F;    // m, between groups of a column
-constexpr float kFree = 0.45F;   // m, above a floor or below a ceiling: no sparse wall is level
-constexpr float kThin = 0.3F;    // m, of a group that may be level: a slope of 45 degrees
-constexpr float kNoise = 0.06F;  // m, between neighbours
-constexpr int kWiden = 2;        // cells
-constexpr int kAcross = 24;      // cells, across half of a hole
+constexpr double kColumn = 0.25;  // m
+constexpr float kGap = 0.15F;     // m, between groups of a column
+constexpr float kFree = 0.45F;    // m, above a floor or below a ceiling: no sparse wall is level
+constexpr float kThin = 0.3F;     // m, of a group that may be level: a slope of 45 degrees
+constexpr float kNoise = 0.06F;   // m, between neighbours
+constexpr int kWiden = 2;         // cells
+constexpr int kAcross = 24;       // cells, across half of a hole
 constexpr std::array<std::pair<int, int>, 4> kSides{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 constexpr float kOff = 0.35F;  // m, what is nearer belongs to the surface (kerbs, beams)
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -76,7 +75,7 @@ class Grower {
   Grower(Pieces& pieces, const Raster& empty, double max_slope)
       : pieces_(pieces),
         empty_(empty),
-        step_(static_cast<float>(kCell * std::tan(max_slope))),
+        step_(static_cast<float>(kColumn * std::tan(max_slope))),
         owner_(empty.values.size(), 0),
         height_(empty.values.size(), kNaN) {}
 
@@ -100,7 +99,7 @@ class Grower {
         }
       }
     }
-    const double area = static_cast<double>(cells.size()) * kCell * kCell;
+    const double area = static_cast<double>(cells.size()) * kColumn * kColumn;
     if (area < least_m2) return std::nullopt;
     LevelSurface surface;
     surface.height = empty_;
@@ -229,17 +228,17 @@ std::vector<LevelSurface> find_level_surfaces(const WorkingCloud& cloud,
                                               std::span<const Vec3f> path,
                                               const GarageConfig& config) {
   constexpr std::size_t kMostSurfaces = 64;
-  const ColumnIndex index(cloud.points, cloud.low, cloud.high, kCell);
+  const ColumnIndex index(cloud.points, cloud.low, cloud.high, kColumn);
   Pieces pieces(index, cloud.points);
   Raster empty;
   empty.low = cloud.low.head<2>().cast<double>();
-  empty.cell_m = kCell;
+  empty.cell_m = kColumn;
   empty.columns = index.columns();
   empty.rows = index.rows();
   empty.values.assign(
       static_cast<std::size_t>(empty.columns) * static_cast<std::size_t>(empty.rows), kNaN);
   std::vector<LevelSurface> surfaces;
-  Grower grower(pieces, empty, config.max_slope_deg * std::numbers::pi / 180);
+  Grower grower(pieces, empty, to_radians(config.max_slope_deg));
   for (int r = 0; r < pieces.rows(); ++r) {
     for (int c = 0; c < pieces.columns(); ++c) {
       for (Piece& piece : pieces.at(c, r)) {
@@ -309,7 +308,7 @@ Raster slopes_of(const LevelSurface& surface) {
           if (surface.seen[height.index(c + dc, r + dr)] == 0) continue;
           const float z = height.values[height.index(c + dc, r + dr)];
           ++count;
-          const Vec3 row(1, kCell * dc, kCell * dr);
+          const Vec3 row(1, kColumn * dc, kColumn * dr);
           A += row * row.transpose();
           b += static_cast<double>(z) * row;
         }

@@ -17,9 +17,7 @@ constexpr double kOffWall = 0.12, kOffPillar = 0.12;     // m
 constexpr double kUsualLength = 4.5, kUsualWidth = 1.8;  // m
 constexpr double kLeastHeight = 1.15;                    // m: parapets are lower
 constexpr double kLeastPart = 1.2;                       // m, of what a cut leaves
-constexpr int kFewest = 40;                              // points
-
-Vec2 flat(const Vec3f& p) { return p.head<2>().cast<double>(); }
+constexpr int kFewestOfCar = 40;                         // points
 
 bool at_structure(const Vec3f& p, const UprightStructure& structure) {
   const auto z = static_cast<double>(p.z());
@@ -79,7 +77,7 @@ double untidiness(const std::vector<Vec3f>& points, const Group& group,
 /// Groups that are no larger than a car.
 void split(const std::vector<Vec3f>& points, Group group, const GarageConfig& config,
            std::vector<Group>& out) {
-  if (group.size() < static_cast<std::size_t>(kFewest)) return;
+  if (group.size() < static_cast<std::size_t>(kFewestOfCar)) return;
   std::vector<Vec2> plan;
   for (const std::uint32_t i : group) plan.push_back(flat(points[i]));
   const Rectangle box = fit_rectangle(plan, 0.01);
@@ -131,7 +129,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
   }
   const ColumnIndex all(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
   std::vector<ParkedCar> cars;
-  for (const Group& cluster : euclidean_clusters(core, kTolerance, kFewest)) {
+  for (const Group& cluster : euclidean_clusters(core, kTolerance, kFewestOfCar)) {
     std::vector<Group> groups;
     split(core, cluster, config, groups);
     for (const Group& group : groups) {
@@ -158,7 +156,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
                      heights.push_back(h);
                    }
                  });
-      if (heights.size() < static_cast<std::size_t>(kFewest)) continue;
+      if (heights.size() < static_cast<std::size_t>(kFewestOfCar)) continue;
       const auto top =
           heights.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(heights.size()));
       std::nth_element(heights.begin(), top, heights.end());

@@ -7,9 +7,9 @@
 namespace arex {
 namespace {
 
-constexpr double kCell = 0.1;    // m, of the raster
-constexpr double kLayer = 0.1;   // m
-constexpr double kLowest = 0.2;  // m above the ground, first layer
+constexpr double kRasterCell = 0.1;  // m, of the raster
+constexpr double kStemLayer = 0.1;   // m
+constexpr double kLowest = 0.2;      // m above the ground, first layer
 constexpr int kLayers = 64;
 constexpr double kMostCells = 4e7;
 constexpr double kLeastSeen = 0.15;  // of the girth
@@ -20,12 +20,12 @@ class LayerRaster {
   LayerRaster(const WorkingCloud& cloud, const std::vector<float>& heights) : low_(cloud.low) {
     const double area = static_cast<double>(cloud.high.x() - cloud.low.x()) *
                         static_cast<double>(cloud.high.y() - cloud.low.y());
-    cell_ = static_cast<float>(std::max(kCell, std::sqrt(area / kMostCells)));
+    cell_ = static_cast<float>(std::max(kRasterCell, std::sqrt(area / kMostCells)));
     columns_ = 1 + static_cast<int>((cloud.high.x() - low_.x()) / cell_);
     rows_ = 1 + static_cast<int>((cloud.high.y() - low_.y()) / cell_);
     masks_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-      const double layer = (static_cast<double>(heights[i]) - kLowest) / kLayer;
+      const double layer = (static_cast<double>(heights[i]) - kLowest) / kStemLayer;
       if (!(layer >= 0 && layer < kLayers)) continue;
       const int c =
           std::min(columns_ - 1, static_cast<int>((cloud.points[i].x() - low_.x()) / cell_));
@@ -78,8 +78,8 @@ class LayerRaster {
 
 /// Filled layers of the longest run that begins low enough; 0 if it is too short.
 int filled_run(std::uint64_t mask, const StemConfig& config) {
-  const int gap = static_cast<int>(std::lround(config.max_gap_m / kLayer));
-  const int top = static_cast<int>(std::ceil((config.band_high_m + 1 - kLowest) / kLayer));
+  const int gap = static_cast<int>(std::lround(config.max_gap_m / kStemLayer));
+  const int top = static_cast<int>(std::ceil((config.band_high_m + 1 - kLowest) / kStemLayer));
   int best = 0;
   for (int begin = 0; begin < top;) {
     if ((mask >> begin & 1) == 0) {
@@ -92,10 +92,10 @@ int filled_run(std::uint64_t mask, const StemConfig& config) {
       last = i;
       ++filled;
     }
-    const double start = kLowest + begin * kLayer;
-    const double length = (last - begin + 1) * kLayer;
+    const double start = kLowest + begin * kStemLayer;
+    const double length = (last - begin + 1) * kStemLayer;
     if (start <= config.max_start_m && length >= config.min_run_m - 1e-9 &&
-        filled * kLayer >= 0.6 * config.min_run_m) {
+        filled * kStemLayer >= 0.6 * config.min_run_m) {
       best = std::max(best, filled);
     }
     begin = last + 1;

@@ -12,11 +12,11 @@
 namespace arex {
 namespace {
 
-constexpr double kInlier = 0.05;      // m from the surface
-constexpr double kWellInside = 0.06;  // m below the surface
-constexpr double kAround = 0.2;       // m above the surface
-constexpr double kWhole = 0.6;        // share of a stem's layers that a seen sector has
-constexpr std::size_t kFewest = 8;    // points of a stem
+constexpr double kInlier = 0.05;          // m from the surface
+constexpr double kWellInside = 0.06;      // m below the surface
+constexpr double kAround = 0.2;           // m above the surface
+constexpr double kWhole = 0.6;            // share of a stem's layers that a seen sector has
+constexpr std::size_t kFewestOfStem = 8;  // points of a stem
 
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
@@ -36,7 +36,7 @@ std::optional<Stem> circle_by_moments(std::span<const Vec3> points, const Vec2& 
     b += d.squaredNorm() * row;
     ++count;
   }
-  if (count < static_cast<int>(kFewest)) return std::nullopt;
+  if (count < static_cast<int>(kFewestOfStem)) return std::nullopt;
   A.diagonal() += Vec3::Constant(1e-9);
   const Vec3 s = A.ldlt().solve(b);
   const Vec2 c = 0.5 * s.head<2>();
@@ -70,7 +70,7 @@ std::optional<Stem> ransac_start(std::span<const Vec3> points, const StemConfig&
   for (const Vec3& p : points) {
     if (std::abs(p.z() - kBreastHeight) < kReach) middle.emplace_back(p.head<2>());
   }
-  if (middle.size() < kFewest) {
+  if (middle.size() < kFewestOfStem) {
     for (const Vec3& p : points) middle.emplace_back(p.head<2>());
   }
   if (const std::size_t stride = 1 + middle.size() / kEnough; stride > 1) {
@@ -197,7 +197,7 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& a
                                      const StemConfig& config) {
   constexpr std::size_t kFollowed = 2;  // of the starts, after the coarse steps
   constexpr double kHopeless = 0.1;     // confidence; bushes have less
-  if (points.size() < kFewest) return std::nullopt;
+  if (points.size() < kFewestOfStem) return std::nullopt;
   std::vector<StemEvidence> begun;
   const auto begin = [&](const Stem& start) {
     begun.push_back(weigh(points, improve(points, start, config, kCoarse)));
@@ -217,7 +217,7 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& a
   std::optional<StemEvidence> best;
   for (const StemEvidence& each : begun) {
     const StemEvidence evidence = weigh(points, improve(points, each.stem, config, kFine));
-    if (evidence.inliers < static_cast<int>(kFewest)) continue;
+    if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }
   return best;

@@ -17,13 +17,13 @@ constexpr double kBandLow = 2.05;       // m above the floor: cars and cabinets 
 constexpr double kBandHigh = 2.75;      // m above the floor
 constexpr double kBelowCeiling = 0.55;  // m: beams and pipes hang lower
 constexpr double kLeastBand = 0.4;      // m
-constexpr double kOnFace = 0.06;        // m, from a wall's line
+constexpr double kOnLine = 0.06;        // m, from a wall's line
 constexpr double kTaken = 0.09;         // m, from a wall's face: no pillar's
 constexpr double kWallGap = 1.0;        // m, a pillar or a door in a wall
 constexpr double kLeastWall = 1.0;      // m, of covered length: more than a pillar's side
 constexpr double kStraight = 0.03;      // m, deviation of a wall's points from its line
 constexpr double kCovered = 0.6;        // of a wall's length
-constexpr double kStep = 0.25;          // m, between points of one cluster
+constexpr double kClusterStep = 0.25;   // m, between points of one cluster
 
 struct Band {
   std::vector<Vec3f> points;
@@ -45,8 +45,6 @@ Band band_of(const WorkingCloud& cloud, const Clearances& clearances) {
   }
   return band;
 }
-
-Vec2 flat(const Vec3f& p) { return p.head<2>().cast<double>(); }
 
 /// The line through points: a point on it and its direction.
 struct Line {
@@ -83,7 +81,7 @@ std::optional<Line> local_line(const std::vector<Vec2>& near, const Vec2& place)
     const Line line{place, arm.normalized(), 0};
     std::vector<Vec2> on;
     for (const Vec2& p : near) {
-      if (line.distance(p) < 0.5 * kOnFace) on.push_back(p);
+      if (line.distance(p) < 0.5 * kOnLine) on.push_back(p);
     }
     if (on.size() > best.size()) best = std::move(on);
   }
@@ -166,10 +164,10 @@ class WallGrower {
         const Vec2 middle = line.p + (t + 0.5 * kBin) * line.u;
         const std::size_t before = taken.size();
         index_.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
-                      static_cast<float>(0.5 * kBin + kOnFace), [&](std::uint32_t i) {
+                      static_cast<float>(0.5 * kBin + kOnLine), [&](std::uint32_t i) {
                         const Vec2 p = flat(band_.points[i]);
                         const double at = (p - line.p).dot(line.u);
-                        if (free_[i] == 0 || line.distance(p) > kOnFace || at < t || at >= t + kBin)
+                        if (free_[i] == 0 || line.distance(p) > kOnLine || at < t || at >= t + kBin)
                           return;
                         if (std::abs(band_.points[i].z() - z) > kStorey) return;
                         taken.push_back(p);
@@ -294,7 +292,7 @@ std::vector<Pillar> pillars_of(const Band& band, const std::vector<std::uint8_t>
     of_cloud.push_back(band.of_cloud[i]);
   }
   std::vector<Pillar> pillars;
-  for (const auto& cluster : euclidean_clusters(rest, kStep, static_cast<int>(kFewest))) {
+  for (const auto& cluster : euclidean_clusters(rest, kClusterStep, static_cast<int>(kFewest))) {
     std::vector<Vec2> points;
     std::vector<float> floors;
     float room = std::numeric_limits<float>::infinity();
@@ -343,9 +341,9 @@ double floor_of(const WallFace& wall, const Band& band, const ColumnIndex& index
   std::vector<float> floors;
   const Vec2 middle = 0.5 * (wall.a + wall.b);
   index.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
-               static_cast<float>(0.5 * wall.length() + kOnFace), [&](std::uint32_t i) {
+               static_cast<float>(0.5 * wall.length() + kOnLine), [&](std::uint32_t i) {
                  const auto z = static_cast<double>(band.points[i].z());
-                 if (wall.distance(flat(band.points[i])) > kOnFace || z < wall.low - 0.1 ||
+                 if (wall.distance(flat(band.points[i])) > kOnLine || z < wall.low - 0.1 ||
                      z > wall.high + 0.1) {
                    return;
                  }

@@ -8,6 +8,9 @@
 
 namespace arex {
 
+/// The point seen from above.
+inline Vec2 flat(const Vec3f& p) { return p.head<2>().cast<double>(); }
+
 /// A cloud as the detectors want it: numbers only, thinned to a mean per voxel, in an order that is
 /// a function of the set of points alone. Points that lie kilometres off are left out.
 struct WorkingCloud {

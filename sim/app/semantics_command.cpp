@@ -53,7 +53,7 @@ Input input_of(const fs::path& given) {
   return input;
 }
 
-void print_result(const SemanticMap& map, const CloudFile& cloud, const fs::path& folder) {
+void print_counts(const SemanticMap& map, const CloudFile& cloud, const fs::path& folder) {
   const auto scene = enum_names(map.scene)[static_cast<std::size_t>(map.scene)];
   std::printf("%s: %.*s, %zu points, %zu after thinning\n", printable(folder.string()).c_str(),
               static_cast<int>(scene.size()), scene.data(), cloud.points.size(), map.points_used);
@@ -98,7 +98,7 @@ int semantics(const SemanticsArguments& arguments) {
   write_semantic_pcd(folder.path() / "semantic.pcd", cloud, map);
   write_atomically(folder.path() / "objects.csv", objects_csv(map));
   write_atomically(folder.path() / "semantic.png", png_bytes(draw_semantic_map(map, path)));
-  print_result(map, cloud, folder.path());
+  print_counts(map, cloud, folder.path());
   return 0;
 }
 

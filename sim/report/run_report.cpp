@@ -104,7 +104,7 @@ std::string name_of(const RunRecord& run) {
   return scenario + ", " + (run.title.empty() ? "seed " + summary.text("seed") : run.title);
 }
 
-std::string header_html(const RunRecord& run) {
+std::string run_header_html(const RunRecord& run) {
   const Summary summary(run.summary ? *run.summary : ordered_json::object());
   const std::string outcome = run.summary ? summary.text("outcome") : "unfinished";
   const std::string name = name_of(run);
@@ -287,7 +287,7 @@ std::string details_html(const RunRecord& run) {
 }  // namespace
 
 std::string run_report_html(const RunRecord& run) {
-  std::string html = header_html(run);
+  std::string html = run_header_html(run);
   html +=
       "<noscript><p class=\"notice\">The replay and the charts need JavaScript; the rest of "
       "this page does not.</p></noscript>\n";

@@ -6,7 +6,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 constexpr double kShareOfRotor = 0.5;
 // Seen from above, in MotorCommand's order.
 constexpr std::array<double, 4> kTurningSense{1, 1, -1, -1};
@@ -18,8 +17,8 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
   for (double& phase : phase_rad_) phase = stream_.uniform(0, 2 * std::numbers::pi);
   // q'' + 2 z w q' + w^2 q = alpha, alpha constant over the tick.
   const double w = 2 * std::numbers::pi * config.frame_mode_hz, z = config.frame_mode_damping;
-  const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kTick_s);
-  const double c = std::cos(wd * kTick_s), s = std::sin(wd * kTick_s);
+  const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kSecondsPerTick);
+  const double c = std::cos(wd * kSecondsPerTick), s = std::sin(wd * kSecondsPerTick);
   transition_ << decay * (c + z * w / wd * s), decay * s / wd, -decay * w * w / wd * s,
       decay * (c - z * w / wd * s);
   const Eigen::Vector2d rest(1 / (w * w), 0);  // where a constant unit alpha ends
@@ -33,7 +32,7 @@ VibrationModel::Shake VibrationModel::step(const std::array<double, 4>& rotor_ra
   double mean_growth = 0;
   for (std::size_t i = 0; i < rotor_radps.size(); ++i) {
     const double speed = rotor_radps[i];
-    phase_rad_[i] = std::fmod(phase_rad_[i] + speed * kTick_s, 2 * std::numbers::pi);
+    phase_rad_[i] = std::fmod(phase_rad_[i] + speed * kSecondsPerTick, 2 * std::numbers::pi);
     const double ratio = speed / config_.reference_speed_radps;
     const double growth = kShareOfRotor * ratio * ratio;
     mean_growth += ratio * ratio / static_cast<double>(rotor_radps.size());

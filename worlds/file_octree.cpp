@@ -53,7 +53,7 @@ void expect_whole(const std::filesystem::path& file) {
   }
 }
 
-std::unique_ptr<octomap::OcTree> load(const std::filesystem::path& file) {
+std::unique_ptr<octomap::OcTree> load_tree(const std::filesystem::path& file) {
   expect_whole(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw std::runtime_error("cannot be opened");
@@ -72,7 +72,7 @@ std::unique_ptr<octomap::OcTree> load(const std::filesystem::path& file) {
 }  // namespace
 
 FileScene read_octree(const std::filesystem::path& file) {
-  const std::unique_ptr<octomap::OcTree> tree = load(file);
+  const std::unique_ptr<octomap::OcTree> tree = load_tree(file);
   FileScene scene;
   scene.up = FileUp::kZ;
   scene.voxel_m = tree->getResolution();

@@ -15,19 +15,19 @@
 namespace arex::worlds {
 namespace {
 
-constexpr double kResolution = 0.2;  // m; conservative cells make every gap narrower by this
-constexpr double kMostCells = 4e7;   // beyond, the cells grow
-constexpr double kHover = 0.8;       // where room is looked for, above the ground, m
-constexpr double kWanted = 0.7;      // room there that is as good as more, m
-constexpr double kOneFloor = 0.01;   // between levels that are the same, m
-constexpr double kOffRim = 2.0;      // from the world's rim to an origin that is meant, m
-constexpr double kLattice = 0.4;     // between the places that are tried, m
-constexpr double kFoot = 0.1;        // from the middle to a leg, along x and y, m
-constexpr double kUneven = 0.05;     // between the ground's heights under middle and legs, m
-constexpr double kOnGround = 0.3;    // a given height this far from the ground means it, m
-constexpr double kLevel = 0.7;       // cosine of the steepest ground to stand on
-constexpr double kFairShare = 0.1;   // of the free space that a start is to give access to
-constexpr double kLeastReach = 1.0;  // m^2 that can be reached, seen from above
+constexpr double kStartResolution = 0.2;  // m; conservative cells make every gap narrower by this
+constexpr double kMostStartCells = 4e7;   // beyond, the cells grow
+constexpr double kHover = 0.8;            // where room is looked for, above the ground, m
+constexpr double kWanted = 0.7;           // room there that is as good as more, m
+constexpr double kOneFloor = 0.01;        // between levels that are the same, m
+constexpr double kOffRim = 2.0;           // from the world's rim to an origin that is meant, m
+constexpr double kLattice = 0.4;          // between the places that are tried, m
+constexpr double kFoot = 0.1;             // from the middle to a leg, along x and y, m
+constexpr double kUneven = 0.05;          // between the ground's heights under middle and legs, m
+constexpr double kOnGround = 0.3;         // a given height this far from the ground means it, m
+constexpr double kStandable = 0.7;        // cosine of the steepest ground to stand on
+constexpr double kFairShare = 0.1;        // of the free space that a start is to give access to
+constexpr double kLeastReach = 1.0;       // m^2 that can be reached, seen from above
 
 using Corners = std::array<Vec3, 3>;
 
@@ -51,7 +51,7 @@ class Ground {
     for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
       if (world.class_of_triangle(t) == SurfaceClass::kLeaf) continue;
       const Corners v = corners_of(world, t);
-      if (std::abs((v[1] - v[0]).cross(v[2] - v[0]).normalized().z()) < kLevel) continue;
+      if (std::abs((v[1] - v[0]).cross(v[2] - v[0]).normalized().z()) < kStandable) continue;
       add(v, static_cast<std::uint32_t>(t));
     }
   }
@@ -132,7 +132,7 @@ double room_at(const World& world, const Vec3& p, double ground) {
     if (((low - p).array() > room).any() || ((p - high).array() > room).any()) continue;
     const Vec3 nearest = nearest_on_triangle(p, v[0], v[1], v[2]);
     const Vec3 normal = (v[1] - v[0]).cross(v[2] - v[0]).normalized();
-    const bool is_ground = std::abs(normal.z()) >= kLevel && nearest.z() < ground + kOnGround;
+    const bool is_ground = std::abs(normal.z()) >= kStandable && nearest.z() < ground + kOnGround;
     if (!is_ground) room = std::min(room, (nearest - p).norm());
   }
   return room;
@@ -147,7 +147,7 @@ struct Space {
 
 Space space_of(const World& world, double radius_m) {
   const double volume = (world.bounds.high - world.bounds.low).prod();
-  const double resolution = std::max(kResolution, std::cbrt(volume / kMostCells));
+  const double resolution = std::max(kStartResolution, std::cbrt(volume / kMostStartCells));
   OccupancyGrid occupancy = voxelize(world, make_grid(world.bounds, resolution),
                                      ClassSet::all().without(SurfaceClass::kLeaf));
   Space space;

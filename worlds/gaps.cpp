@@ -14,8 +14,8 @@ namespace {
 
 /// A pillar whose drawn surface touches its round solid at y = +-radius exactly, where gaps are
 /// measured, and lies within it elsewhere.
-void add_pillar(MeshBuilder& builder, const Vec2& p, double radius, double height,
-                RandomStream& random) {
+void add_round_pillar(MeshBuilder& builder, const Vec2& p, double radius, double height,
+                      RandomStream& random) {
   constexpr int kSides = 24;
   const std::uint32_t object =
       builder.add_object(SurfaceClass::kPillar, kConcreteReflectivity.draw(random));
@@ -47,7 +47,8 @@ World build(const GapsRecipe& recipe, std::uint64_t seed) {
   for (const double side : {-1.0, 1.0}) {
     double y = recipe.gap_offset_m + side * (recipe.gap_m / 2 + radius);
     while (std::abs(y) - radius < recipe.width_m / 2) {
-      add_pillar(builder, {recipe.wall_distance_m, y}, radius, recipe.pillar_height_m, random);
+      add_round_pillar(builder, {recipe.wall_distance_m, y}, radius, recipe.pillar_height_m,
+                       random);
       y += side * (2 * radius + recipe.slot_m);
     }
     builder.add_solid_box(
@@ -76,7 +77,7 @@ World build(const GapsRecipe& recipe, std::uint64_t seed) {
                                      recipe.field_spacing_m, random.fork(0))) {
     const double r = random.uniform(recipe.field_radius_min_m, recipe.field_radius_max_m);
     if (p.norm() < recipe.start_radius_m + r) continue;
-    add_pillar(builder, p, r, recipe.pillar_height_m, random);
+    add_round_pillar(builder, p, r, recipe.pillar_height_m, random);
   }
   return builder.finish();
 }

@@ -43,8 +43,6 @@ void add_small_box(MeshBuilder& mesh, std::uint32_t object, const Box& box) {
 
 namespace {
 
-constexpr double kSlab = 0.3;  // thickness of floors and ceilings, m
-
 /// A slab over the hall without the ramp's shaft: three rectangles. Only the face towards the hall
 /// is drawn.
 void add_slab(const Site& site, std::uint32_t object, double face_z, double thickness) {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
 #include "worlds/reflectivity.h"
 #include "worlds/world.h"
@@ -129,7 +128,7 @@ struct GarageRecipe {
     f.check(ceiling_z_m - floor_z_m >= 2.8 && ceiling_z_m - floor_z_m <= 6,
             "2.8 <= ceiling_z_m - floor_z_m <= 6");
     f.check(ramp_angle_deg >= 15 && ramp_angle_deg <= 40, "15 <= ramp_angle_deg <= 40");
-    f.check(-floor_z_m <= 0.4 * length_m * std::tan(ramp_angle_deg * std::numbers::pi / 180),
+    f.check(-floor_z_m <= 0.4 * length_m * std::tan(to_radians(ramp_angle_deg)),
             "the ramp ends within 0.4 of length_m: -floor_z_m <= 0.4 length_m tan(ramp_angle_deg)");
     f.check(ramp_width_m >= 3 && ramp_width_m <= 10, "3 <= ramp_width_m <= 10");
     f.check(pillar_width_m >= 0.2 && pillar_width_m <= 1.5, "0.2 <= pillar_width_m <= 1.5");

@@ -14,9 +14,7 @@ constexpr double kYardBeyond = 15.0;  // and from the portal on, m
 constexpr Interval kYardY{-10.0, 10.0};
 constexpr double kYardWall = 2.4;  // height, m
 constexpr double kParapet = 1.0;   // height above the ground, m
-constexpr double kSlab = 0.3;      // thickness of ground, ramp and roof, m
 constexpr double kRib = 0.25;      // beams under the roof, square, m
-constexpr double kMark = 0.003;    // thickness of a painted line, m
 
 /// The ramp's surface as a frame R: x down the slope, y left, z off the surface; origin at the
 /// middle of the crest.
@@ -26,7 +24,7 @@ struct RampFrame {
   double length;
 
   explicit RampFrame(const Site& site) {
-    const double angle = site.recipe.ramp_angle_deg * std::numbers::pi / 180;
+    const double angle = to_radians(site.recipe.ramp_angle_deg);
     X_WR = {so3::Exp(Vec3(0, angle, 0)), Vec3(site.plan.crest_x, 0, 0)};
     slope = std::tan(angle);
     length = (site.plan.foot_x - site.plan.crest_x) / std::cos(angle);

@@ -8,7 +8,6 @@
 namespace arex::worlds::garage {
 namespace {
 
-constexpr double kMark = 0.003;       // thickness of a painted line, m
 constexpr double kLineHalf = 0.05;    // half width of a painted line, m
 constexpr double kLeaf = 0.05;        // thickness of a door leaf, m
 constexpr double kKerbHeight = 0.12;  // m

@@ -26,7 +26,9 @@ struct Box {
 };
 
 /// Large faces are cut into tiles of at most this side, so that chunks stay local.
-inline constexpr double kTile = 3.0;  // m
+inline constexpr double kTile = 3.0;    // m
+inline constexpr double kSlab = 0.3;    // thickness of floors, ramp and roof, m
+inline constexpr double kMark = 0.003;  // thickness of a painted line, m
 
 /// A parallelogram from `corner` along `u` and `v`, in tiles.
 void add_tiled_face(MeshBuilder& mesh, std::uint32_t object, const Vec3& corner, const Vec3& u,

@@ -25,7 +25,7 @@ struct Slot {
 };
 
 void plan_hall(const GarageRecipe& recipe, GaragePlan& plan) {
-  const double slope = std::tan(recipe.ramp_angle_deg * std::numbers::pi / 180);
+  const double slope = std::tan(to_radians(recipe.ramp_angle_deg));
   const double storey = recipe.ceiling_z_m - recipe.floor_z_m;
   plan.crest_x = kApron;
   plan.foot_x = kApron - recipe.floor_z_m / slope;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <numbers>
-
 #include "math/types.h"
 
 namespace arex {
@@ -88,9 +86,9 @@ struct AttitudeControlConfig {
   double rate_integral_per_s = 2.0;  ///< I = this * P
   double rate_derivative_s = 0.015;  ///< D = this * P
   double integral_limit_nm = 0.3;    ///< each axis
-  double tilt_rate_limit_radps = 220 * std::numbers::pi / 180;
-  double yaw_rate_limit_radps = 200 * std::numbers::pi / 180;
-  double tilt_limit_rad = 45 * std::numbers::pi / 180;
+  double tilt_rate_limit_radps = to_radians(220);
+  double yaw_rate_limit_radps = to_radians(200);
+  double tilt_limit_rad = to_radians(45);
   double rate_loop_hz = 500;
   double attitude_loop_hz = 250;
   double gyro_cutoff_hz = 60;        ///< below one per revolution at hover, 109-120 Hz

@@ -11,6 +11,9 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1")
 
+# For whoever builds all of it once; for work on the code, and for its tools, each source is a unit.
+option(AREX_UNITY "Compile the sources of each library in batches" OFF)
+
 find_program(CCACHE ccache)
 if(CCACHE)
   # ccache sees through precompiled headers only with these.
@@ -56,4 +59,5 @@ function(arex_library name)
   add_library(${name} STATIC ${ARGN})
   target_link_libraries(${name} PUBLIC arex_options)
   target_precompile_headers(${name} REUSE_FROM arex_pch)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${AREX_UNITY} UNITY_BUILD_BATCH_SIZE 8)
 endfunction()

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <numbers>
-
 #include "math/types.h"
 #include "messages/estimates.h"
 #include "messages/vehicle.h"
@@ -11,7 +9,7 @@ namespace arex {
 struct TrackerConfig {
   Vec3 position_gain{11.1, 11.1, 12.0};  ///< kx, N/m at 1.9 kg
   Vec3 velocity_gain{6.6, 6.6, 7.8};     ///< kv, N/(m/s) at 1.9 kg
-  double tilt_limit_rad = 45 * std::numbers::pi / 180;
+  double tilt_limit_rad = to_radians(45);
   double min_lift_fraction = 0.2;  ///< of the weight: the vertical force is never less in the air
   double max_lift_fraction = 1.8;
   bool observe_disturbance = true;

@@ -19,7 +19,7 @@ Cell round_to_cell(const Vec3& p, double resolution_m) {
   return (p / resolution_m).array().round().cast<int>();
 }
 
-constexpr std::size_t kBatch = 32;  ///< bricks
+constexpr std::size_t kBrickBatch = 32;  ///< bricks
 
 }  // namespace
 
@@ -45,7 +45,7 @@ void GlobalMap::add_frame(const RayCaster& rays) {
   const CellBox brick_box{brick_low_, brick_low_ + brick_count_};
   // In batches, each memory access asked for a step before it is needed: the map is larger than the
   // cache.
-  std::array<Look, kBatch> looks;
+  std::array<Look, kBrickBatch> looks;
   std::size_t count = 0;
   const auto insert_batch = [&] {
     for (std::size_t i = 0; i < count; ++i) apply_evidence(looks[i]);
@@ -68,7 +68,7 @@ void GlobalMap::add_frame(const RayCaster& rays) {
          {&brick->known, &brick->occupied, &brick->at_low, &brick->at_high}) {
       __builtin_prefetch(mask);
     }
-    if (count == kBatch) insert_batch();
+    if (count == kBrickBatch) insert_batch();
   }
   insert_batch();
   for (const BrickChange& change : changes_) band_.note(change);

@@ -15,6 +15,7 @@ namespace arex {
 struct GridView {
   static constexpr std::uint8_t kOccupied = 1;
   static constexpr std::uint8_t kInflated = 2;
+  static constexpr std::uint8_t kBlocked = kOccupied | kInflated;
   static constexpr std::uint8_t kKnown = 4;
   static constexpr std::uint8_t kBarred = 8;
 
@@ -43,9 +44,7 @@ struct GridView {
     const Eigen::Vector3i cell = cell_of(p);
     return contains(cell) ? cells[index(cell)] : std::uint8_t{0};
   }
-  [[nodiscard]] bool inflated(const Vec3& p) const {
-    return (at(p) & (kInflated | kOccupied)) != 0;
-  }
+  [[nodiscard]] bool inflated(const Vec3& p) const { return (at(p) & kBlocked) != 0; }
   [[nodiscard]] bool known(const Vec3& p) const { return (at(p) & kKnown) != 0; }
 };
 

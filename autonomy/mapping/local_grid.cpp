@@ -9,16 +9,16 @@
 namespace arex {
 namespace {
 
-constexpr double kUnitsPerLogOdds = 27;  ///< 0.7 -> 23, 0.4 -> -11, 0.12 -> -54, 0.97 -> 94
+constexpr double kGridUnitsPerLogOdds = 27;  ///< 0.7 -> 23, 0.4 -> -11, 0.12 -> -54, 0.97 -> 94
 constexpr std::int8_t kUnseen = -128;
 constexpr std::uint8_t kConfirmed = 0x80;
 constexpr std::uint8_t kFrameCount = 0x0f;
 constexpr int kDecaySlices = 10;  ///< of the grid, one after the other within kDecayPeriod
 constexpr Stamp kDecayPeriod = kNanosecondsPerSecond;
 
-int to_units(double probability) {
+int to_grid_units(double probability) {
   return static_cast<int>(
-      std::lround(std::log(probability / (1 - probability)) * kUnitsPerLogOdds));
+      std::lround(std::log(probability / (1 - probability)) * kGridUnitsPerLogOdds));
 }
 
 Cell grid_size(const Vec3& size_m, double resolution_m) {
@@ -147,12 +147,12 @@ LocalGrid::LocalGrid(const LocalGridConfig& config, double inflation_m, double r
     : config_(config),
       resolution_m_(resolution_m),
       size_(grid_size(config.size_m, resolution_m)),
-      hit_units_(to_units(config.sensor.hit_probability)),
-      miss_units_(to_units(config.sensor.miss_probability)),
-      min_units_(to_units(config.sensor.min_probability)),
-      max_units_(to_units(config.sensor.max_probability)),
+      hit_units_(to_grid_units(config.sensor.hit_probability)),
+      miss_units_(to_grid_units(config.sensor.miss_probability)),
+      min_units_(to_grid_units(config.sensor.min_probability)),
+      max_units_(to_grid_units(config.sensor.max_probability)),
       decay_units_(static_cast<int>(
-          std::lround(config.decay_per_s * to_seconds(kDecayPeriod) * kUnitsPerLogOdds))),
+          std::lround(config.decay_per_s * to_seconds(kDecayPeriod) * kGridUnitsPerLogOdds))),
       low_(-size_ / 2),
       evidence_(static_cast<std::size_t>(size_.prod()) + kBlock, kUnseen),
       frames_(evidence_.size(), 0),

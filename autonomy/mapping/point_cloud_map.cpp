@@ -10,7 +10,7 @@ namespace arex {
 namespace {
 
 constexpr std::size_t kFirstSlots = 1U << 16;
-constexpr std::size_t kBatch = 32;  ///< points
+constexpr std::size_t kPointBatch = 32;  ///< points
 // A voxel's mean settles; more points would only wear out its count.
 constexpr std::uint32_t kMaxCount = 1000;
 
@@ -47,7 +47,7 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
     std::uint64_t key;
     Vec3f p;
   };
-  std::array<Keyed, kBatch> batch;
+  std::array<Keyed, kPointBatch> batch;
   std::size_t count = 0;
   const auto insert_batch = [&] {
     const std::size_t mask = slots_.size() - 1;
@@ -63,7 +63,7 @@ void PointCloudMap::insert(std::span<const Vec3f> points_O) {
     const std::uint64_t key = key_of(p, config_.voxel_m);
     __builtin_prefetch(&slots_[mix_bits(key) & (slots_.size() - 1)]);
     batch[count++] = {key, p};
-    if (count == kBatch) insert_batch();
+    if (count == kPointBatch) insert_batch();
   }
   insert_batch();
 }

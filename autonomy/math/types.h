@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 namespace arex {
 
@@ -24,6 +25,8 @@ inline constexpr Stamp kNanosecondsPerTick = 1'000'000;  ///< lockstep: 1 kHz
 constexpr double to_seconds(Stamp stamp) {
   return static_cast<double>(stamp) / static_cast<double>(kNanosecondsPerSecond);
 }
+inline constexpr double kSecondsPerTick = to_seconds(kNanosecondsPerTick);
+
 /// Longer than any run, 73 years; sums of a few still are Stamps.
 inline constexpr Stamp kForever = std::numeric_limits<Stamp>::max() / 4;
 
@@ -35,6 +38,8 @@ constexpr Stamp from_seconds(double seconds) {
   if (nanoseconds < -static_cast<double>(kForever)) return -kForever;
   return static_cast<Stamp>(nanoseconds + (seconds < 0 ? -0.5 : 0.5));
 }
+
+constexpr double to_radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 /// Standard gravity, m/s^2; the only definition of it.
 inline constexpr double kGravity = 9.80665;

@@ -6,7 +6,6 @@
 namespace arex {
 namespace {
 
-constexpr std::uint8_t kBlocked = GridView::kInflated | GridView::kOccupied;
 constexpr double kPiecesPerCell = 2.0;  ///< first pieces are half a cell long
 
 /// The curve begins and ends at rest in places that somebody else chose, and round numbers lie on
@@ -62,7 +61,7 @@ void walk(const GridView& grid, const UniformBspline& spline, double from_s, Vis
 
 bool is_blocked(const GridView& grid, const Vec3& p) {
   const Eigen::Vector3i cell = grid.cell_of(p);
-  return !grid.contains(cell) || (grid.cells[grid.index(cell)] & kBlocked) != 0;
+  return !grid.contains(cell) || (grid.cells[grid.index(cell)] & GridView::kBlocked) != 0;
 }
 
 bool is_box_blocked(const GridView& grid, const Vec3& low, const Vec3& high) {
@@ -71,7 +70,7 @@ bool is_box_blocked(const GridView& grid, const Vec3& low, const Vec3& high) {
   for (int z = a.z(); z <= b.z(); ++z) {
     for (int x = a.x(); x <= b.x(); ++x) {
       for (int y = a.y(); y <= b.y(); ++y) {
-        if ((grid.cells[grid.index({x, y, z})] & kBlocked) != 0) return true;
+        if ((grid.cells[grid.index({x, y, z})] & GridView::kBlocked) != 0) return true;
       }
     }
   }

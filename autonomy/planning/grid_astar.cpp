@@ -8,7 +8,6 @@
 namespace arex {
 namespace {
 
-constexpr std::uint8_t kBlocked = GridView::kInflated | GridView::kOccupied;
 constexpr int kStepCost[4] = {0, 10, 14, 17};  ///< by the number of axes that change
 constexpr std::uint8_t kNoStep = 26;
 
@@ -105,7 +104,7 @@ void GridAstar::expand(const GridView& grid, const Window& window, std::uint32_t
       for (int dy = -1; dy <= 1; ++dy) {
         const bool inside = row_inside && local.y() + dy >= 0 && local.y() + dy < window.size.y();
         if (!inside || (grid.cells[grid.index({cell.x() + dx, cell.y() + dy, cell.z() + dz})] &
-                        kBlocked) != 0) {
+                        GridView::kBlocked) != 0) {
           blocked |= 1u << block_bit(dx, dy, dz);
         }
       }
@@ -148,8 +147,8 @@ AstarResult GridAstar::search(const GridView& grid, const Eigen::Vector3i& start
                               const Eigen::Vector3i& goal, const AstarOptions& options) {
   AstarResult result;
   if (!grid.contains(start) || !grid.contains(goal) ||
-      (grid.cells[grid.index(start)] & kBlocked) != 0 ||
-      (grid.cells[grid.index(goal)] & kBlocked) != 0) {
+      (grid.cells[grid.index(start)] & GridView::kBlocked) != 0 ||
+      (grid.cells[grid.index(goal)] & GridView::kBlocked) != 0) {
     return result;
   }
   Window window{Eigen::Vector3i::Zero(), grid.size};

@@ -13,7 +13,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMargin = 20;            ///< cells searched around map, start and goal
 constexpr std::size_t kMaxPull = 200;  ///< cells that one straight piece may replace
-constexpr double kBlocked = -1.0;
+constexpr double kNoPassage = -1.0;
 /// Ends of partial guides that differ by less in what is left to the target are equally near: a
 /// wall of half a metre with the distance kept from its two sides.
 constexpr double kSameNearness_m = 2.0;
@@ -50,7 +50,7 @@ class CostMap {
         if (at_edge || d <= 0 || (d < near && !at_end())) {
           const bool fits =
               !at_edge && d > 0 && d > tight - kRounding && map.at(cell) == OccupancyMap2D::kFree;
-          cost_[i] = fits ? 1.0 + kTight * config.comfort_weight : kBlocked;
+          cost_[i] = fits ? 1.0 + kTight * config.comfort_weight : kNoPassage;
           continue;
         }
         cost_[i] = 1.0;
@@ -64,7 +64,7 @@ class CostMap {
     const auto width = static_cast<std::uint32_t>(map.width);
     for (const std::uint32_t k : map.flown) {
       double& cost = cost_[index({static_cast<int>(k % width), static_cast<int>(k / width)})];
-      if (cost == kBlocked) cost = 1.0 + config.comfort_weight;
+      if (cost == kNoPassage) cost = 1.0 + config.comfort_weight;
     }
   }
 
@@ -83,7 +83,7 @@ class CostMap {
   [[nodiscard]] bool passable(const Eigen::Vector2i& cell) const {
     return contains(cell) && passable(index(cell));
   }
-  [[nodiscard]] bool passable(std::size_t index) const { return cost_[index] != kBlocked; }
+  [[nodiscard]] bool passable(std::size_t index) const { return cost_[index] != kNoPassage; }
   [[nodiscard]] double cost(std::size_t index) const { return cost_[index]; }
   /// From a cell's index to that of the cell one row further on.
   [[nodiscard]] std::ptrdiff_t row() const { return size_.x(); }

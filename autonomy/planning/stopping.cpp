@@ -14,7 +14,7 @@ constexpr double kWantedRoom_m =
     0.6;                          ///< clearances beyond this are all alike: twice the vehicle's
 constexpr double kLook_s = 0.05;  ///< between the places of a stop that are looked at
 constexpr double kHover_s = 1.0;  ///< how long it will stay where the stop ends
-constexpr double kAtRest_mps = 1e-9;
+constexpr double kStopped_mps = 1e-9;
 /// Swerves tried: angle (rad) of the first push from straight back, and how long it lasts (s).
 constexpr double kSwerveAngles[] = {0.35, 0.7, 1.05, 1.4};
 constexpr double kSwerveTimes[] = {0.1, 0.2, 0.3, 0.45};
@@ -29,7 +29,7 @@ UniformBspline stop_with(const MotionState& state, const Vec3& push, double push
   Vec3 v = (q[2] - q[1]) / dt;  // V_1
   const double step = limits.max_acceleration_mps2 * dt;
   const int pushes = static_cast<int>(std::lround(push_s / dt));
-  for (int k = 0; v.norm() > kAtRest_mps || k < pushes; ++k) {
+  for (int k = 0; v.norm() > kStopped_mps || k < pushes; ++k) {
     if (k < pushes) {
       v += push * dt;
     } else {
@@ -46,7 +46,7 @@ UniformBspline stop_with(const MotionState& state, const Vec3& push, double push
 template <class Visit>
 void for_each_swerve(const MotionState& state, const MotionLimits& limits, double dt, Visit visit) {
   const double speed = state.v.norm();
-  if (speed < kAtRest_mps) return;
+  if (speed < kStopped_mps) return;
   const Vec3 ahead = state.v / speed;
   const Vec3 across = Vec3::UnitZ().cross(ahead);
   const Vec3 left = across.norm() > 1e-6 ? Vec3(across.normalized()) : Vec3::UnitY();

@@ -73,6 +73,13 @@ struct SweepTaskArguments {
 };
 int sweep_task(const SweepTaskArguments& arguments);
 
+struct SemanticsArguments {
+  std::string input;                   ///< a cloud (PCD, PLY) or a run folder
+  std::string out;                     ///< folder to write
+  std::vector<std::string> overrides;  ///< --set key=value, keys of the section `semantics`
+};
+int semantics(const SemanticsArguments& arguments);
+
 struct ReportArguments {
   std::vector<std::string> folders;  ///< run folders and sweeps
   bool runs = false;                 ///< also of every run of a sweep

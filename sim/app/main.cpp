@@ -165,6 +165,17 @@ void add_evaluate(CLI::App& app, EvaluateArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = evaluate(arguments); });
 }
 
+void add_semantics(CLI::App& app, SemanticsArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("semantics", "name what a point cloud shows");
+  command->add_option("cloud", arguments.input, "CLOUD.pcd, CLOUD.ply or a run folder")->required();
+  command->add_option("--out", arguments.out, "folder to write")->required();
+  command
+      ->add_option("--set", arguments.overrides,
+                   "key=value of the section semantics, as scene=forest; see arex params")
+      ->allow_extra_args(false);
+  command->callback([&] { exit_code = semantics(arguments); });
+}
+
 void add_help(CLI::App& app, std::string& topic, int& exit_code) {
   auto* command = app.add_subcommand("help", "say what something is: help figures");
   command->add_option("topic", topic, "figures: every field of summary.json and column of the CSVs")
@@ -221,6 +232,7 @@ int execute(int argc, char** argv) {
   SweepTaskArguments sweep_task_arguments;
   ReportArguments report_arguments;
   EvaluateArguments evaluate_arguments;
+  SemanticsArguments semantics_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   std::string help_topic;
@@ -232,6 +244,7 @@ int execute(int argc, char** argv) {
   add_sweep_task(app, sweep_task_arguments, exit_code);
   add_report(app, report_arguments, exit_code);
   add_evaluate(app, evaluate_arguments, exit_code);
+  add_semantics(app, semantics_arguments, exit_code);
   add_help(app, help_topic, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);

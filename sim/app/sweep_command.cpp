@@ -213,7 +213,7 @@ void warn_of_another_build(const sim::SweepPlan& plan, const sim::SweepFolder& f
 }
 
 // What is swept must not stand in the middle of something else.
-void expect_no_run(const std::filesystem::path& folder) {
+void expect_sweep_folder(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(folder / "resolved.yaml")) return;
   throw ConfigError(folder.string() + ": holds a run, expected a folder for the sweep");
 }
@@ -325,7 +325,7 @@ int sweep(const SweepArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the progress may leave: the sweep goes on
   const sim::OutputFolder made(arguments.out);
   const sim::SweepFolder folder(std::filesystem::canonical(made.path()));
-  expect_no_run(folder.root());
+  expect_sweep_folder(folder.root());
   sim::FileLock lock(folder.root() / kDriverLock, sim::FileLock::Mode::kExclusive);
   if (!lock.take(kPatience_s)) {
     throw ConfigError(arguments.out + ": another sweep is at work here (" + lock.holder() +

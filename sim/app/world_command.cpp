@@ -107,7 +107,7 @@ void coarsen(const worlds::World& world, worlds::ExportConfig& exported) {
 }
 
 // What a run has there would be half replaced.
-void expect_no_run(const std::filesystem::path& folder) {
+void expect_world_folder(const std::filesystem::path& folder) {
   for (const char* name : {"resolved.yaml", "sweep.json"}) {
     if (!std::filesystem::exists(folder / name)) continue;
     throw ConfigError(folder.string() + ": holds " + name +
@@ -135,7 +135,7 @@ int world(const WorldArguments& arguments) {
   }
   const bool from_file = recipe.world.kind == worlds::WorldKind::kFile;
   const sim::OutputFolder folder(arguments.out);
-  expect_no_run(folder.path());
+  expect_world_folder(folder.path());
   for (const std::string_view file : worlds::kExportedFiles) check_writable(folder.path() / file);
   if (from_file) check_writable(folder.path() / kOverview);
   const worlds::FileWorld built = build(root, recipe, direct);

@@ -14,7 +14,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 constexpr double kTwoPi = 2 * std::numbers::pi;
 /// Sense of rotation about B's z (MotorCommand's order).
 constexpr std::array<double, 4> kSpin{1, 1, -1, -1};
@@ -38,7 +37,7 @@ class Physics::Impl {
         powertrain_(config.motor, config.rotor, config.battery),
         wind_(config.wind, seed) {
     if (!data_) throw std::runtime_error("MuJoCo cannot allocate its data");
-    if (std::abs(scene_.model().opt.timestep - kTick_s) > 1e-12) {
+    if (std::abs(scene_.model().opt.timestep - kSecondsPerTick) > 1e-12) {
       throw std::runtime_error("models/arex/arex.xml: timestep differs from the tick");
     }
     set_state(X_WB_start, Vec3::Zero(), Vec3::Zero(), {});
@@ -157,8 +156,8 @@ class Physics::Impl {
     const Vec3 v = Eigen::Map<const Vec3>(data_->qvel);
     const Vec3 w = Eigen::Map<const Vec3>(data_->qvel + 3);
     truth_.stamp += kNanosecondsPerTick;
-    truth_.a_WB = (v - truth_.v_WB) / kTick_s;
-    truth_.alpha_WB_B = (w - truth_.w_WB_B) / kTick_s;
+    truth_.a_WB = (v - truth_.v_WB) / kSecondsPerTick;
+    truth_.alpha_WB_B = (w - truth_.w_WB_B) / kSecondsPerTick;
     truth_.v_WB = v;
     truth_.w_WB_B = w;
     const mjtNum* q = data_->qpos;

@@ -6,7 +6,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 constexpr double kSecondsPerHour = 3600;
 constexpr std::size_t kRotors = 4;
 
@@ -92,11 +91,11 @@ double Powertrain::speed_after_tick(double throttle, double bus_v, double speed)
            rotor_.inertia_kgm2;
   };
   const double k1 = acceleration(speed);
-  const double k2 = acceleration(speed + 0.5 * kTick_s * k1);
-  const double k3 = acceleration(speed + 0.5 * kTick_s * k2);
-  const double k4 = acceleration(speed + kTick_s * k3);
+  const double k2 = acceleration(speed + 0.5 * kSecondsPerTick * k1);
+  const double k3 = acceleration(speed + 0.5 * kSecondsPerTick * k2);
+  const double k4 = acceleration(speed + kSecondsPerTick * k3);
   // Friction stops a rotor; it does not turn it backwards.
-  return std::max(0.0, speed + kTick_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4));
+  return std::max(0.0, speed + kSecondsPerTick / 6 * (k1 + 2 * k2 + 2 * k3 + k4));
 }
 
 void Powertrain::step(const MotorCommand& command) {
@@ -121,15 +120,15 @@ void Powertrain::step(const MotorCommand& command) {
                          ? (open_circuit_v() - bus_v) / battery_.resistance_ohm
                          : load(throttle, bus_v).current_a;
   state_.voltage_v = bus_v;
-  state_.used_wh += bus_v * state_.current_a * kTick_s / kSecondsPerHour;
-  charge_ -= state_.current_a * kTick_s / (battery_.capacity_ah * kSecondsPerHour);
+  state_.used_wh += bus_v * state_.current_a * kSecondsPerTick / kSecondsPerHour;
+  charge_ -= state_.current_a * kSecondsPerTick / (battery_.capacity_ah * kSecondsPerHour);
   charge_ = std::clamp(charge_, -battery_.empty_tail_fraction, 1.0);
   state_.state_of_charge = std::max(charge_, 0.0);
 
   for (std::size_t i = 0; i < kRotors; ++i) {
     current_[i] = motor_current(throttle[i], bus_v, speed_[i]);
     const double next = speed_after_tick(throttle[i], bus_v, speed_[i]);
-    acceleration_[i] = (next - speed_[i]) / kTick_s;
+    acceleration_[i] = (next - speed_[i]) / kSecondsPerTick;
     speed_[i] = next;
   }
 }

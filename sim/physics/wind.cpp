@@ -7,7 +7,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 constexpr double kMetresPerFoot = 0.3048;
 
 /// The integrals of s^k exp(-2 s) over [0, d], k = 0, 1, 2.
@@ -24,7 +23,7 @@ std::array<double, 3> noise_integrals(double d) {
 }  // namespace
 
 DrydenWind::Cascade::Cascade(double time_constant_s, RandomStream& random) {
-  const double d = kTick_s / time_constant_s;
+  const double d = kSecondsPerTick / time_constant_s;
   decay = std::exp(-d);
   coupling = d * decay;
   const auto [q11, q12, q22] = noise_integrals(d);

@@ -1,7 +1,6 @@
 #pragma once
 
 // Included by .cpp files only: OpenGL 4.5 as libOpenGL exports it, and its objects by RAII.
-#define GL_GLEXT_PROTOTYPES
 #include <GL/gl.h>
 #include <GL/glext.h>
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "files/png.h"
 #include "math/pose.h"
 #include "messages/sensors.h"
 #include "worlds/world.h"
@@ -14,12 +15,7 @@
 /// Colour pictures of a world, for people: `arex render`, reports, the README.
 namespace arex::sim {
 
-/// Rows from the top, three bytes (red, green, blue) a pixel.
-struct Picture {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> rgb;
-};
+using Picture = RgbImage;
 
 /// @throws std::runtime_error if the file cannot be written.
 void save_png(const Picture& picture, const std::filesystem::path& file);

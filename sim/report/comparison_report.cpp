@@ -191,7 +191,7 @@ std::string runs_html(const ResultTable& results, const std::filesystem::path& d
   return html;
 }
 
-std::string header_html(const ResultTable& results, const std::string& title) {
+std::string comparison_header_html(const ResultTable& results, const std::string& title) {
   const Table& table = results.table;
   std::map<std::string, std::size_t> counts;
   std::set<std::string> seeds;
@@ -262,7 +262,7 @@ std::string comparison_report_html(const ResultTable& results, const std::string
   const Overlay overlay = overlay_of(results);
   ordered_json payload = comparison_payload(results, directory);
   payload["overlay"] = overlay_json(overlay);
-  std::string html = header_html(results, title);
+  std::string html = comparison_header_html(results, title);
   html +=
       "<noscript><p class=\"notice\">Curves, heat map and statistics need JavaScript; the rest of "
       "this page does not.</p></noscript>\n";

@@ -13,11 +13,11 @@
 namespace arex::sim {
 namespace {
 
-constexpr std::size_t kMaxPath = 3000;  // corners of a drawn path
+constexpr std::size_t kDrawnCorners = 3000;  // corners of a drawn path
 
 std::string code(const std::string& text) { return "<code>" + escape_markup(text) + "</code>"; }
 
-std::string header_html(const Comparison& comparison) {
+std::string evaluation_header_html(const Comparison& comparison) {
   const EvaluationOptions& options = comparison.options;
   const Trajectory& reference = comparison.reference;
   std::string html = "<h1>Trajectory error</h1>\n<p>Reference: " + code(reference.file) + ", " +
@@ -84,7 +84,7 @@ class TopView {
   [[nodiscard]] std::string polyline(const std::vector<PosePair>& pairs, Pose PosePair::*which,
                                      const std::string& name) const {
     std::string points;
-    const std::size_t step = pairs.size() / kMaxPath + 1;
+    const std::size_t step = pairs.size() / kDrawnCorners + 1;
     const auto add = [&](const PosePair& pair) {
       const Vec2 p = (*this)(pair.*which);
       points += fmt::format("{:.3f},{:.3f} ", p.x(), -p.y());
@@ -167,7 +167,7 @@ std::string charts_html(const Comparison& comparison) {
 }  // namespace
 
 std::string evaluation_report_html(const Comparison& comparison) {
-  std::string html = header_html(comparison);
+  std::string html = evaluation_header_html(comparison);
   html += figures_html(comparison);
   html += notes_html(comparison);
   html += tracks_html(comparison);

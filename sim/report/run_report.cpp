@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 
 #include "files/files.h"
 #include "report/map_picture.h"
@@ -103,7 +104,7 @@ std::string name_of(const RunRecord& run) {
   return scenario + ", " + (run.title.empty() ? "seed " + summary.text("seed") : run.title);
 }
 
-std::string header_html(const RunRecord& run) {
+std::string run_header_html(const RunRecord& run) {
   const Summary summary(run.summary ? *run.summary : ordered_json::object());
   const std::string outcome = run.summary ? summary.text("outcome") : "unfinished";
   const std::string name = name_of(run);
@@ -143,6 +144,40 @@ std::string map_html(const RunRecord& run) {
                            "candidate</span>") +
          (run.map ? "" : "<span>No 2D map was recorded: the cloud seen from above.</span>") +
          "</figcaption>\n</figure>\n</section>\n";
+}
+
+// What the mapped cloud shows, and how right that is.
+std::string semantics_html(const RunRecord& run) {
+  constexpr std::size_t kMostBytes = 20'000'000;
+  constexpr std::string_view kSignature = "\x89PNG\r\n";
+  const auto png = read_bytes(run.folder / "semantic.png");
+  if (!png || !png->starts_with(kSignature) || png->size() > kMostBytes) return {};
+  const Summary summary(run.summary ? *run.summary : ordered_json::object());
+  const Table objects = read_table(run.folder / "objects.csv");
+  std::string rows;
+  for (const char* name : {"trunk", "pillar", "car", "wall", "ramp", "door"}) {
+    std::size_t named = 0;
+    for (std::size_t i = 0; i < objects.rows.size(); ++i) named += objects.text(i, "class") == name;
+    std::string cells;
+    bool scored = false;
+    for (const char* figure : {"precision", "recall", "f1", "position_median_m", "size_median_m"}) {
+      const FigureInfo* info = find_figure("semantic." + std::string(name) + "." + figure);
+      const std::string value = info ? summary.shown(*info) : "";
+      scored |= !value.empty();
+      cells += "<td>" + (value.empty() ? "–" : escape_markup(value)) + "</td>";
+    }
+    if (named == 0 && !scored) continue;
+    rows += "<tr><td class=\"word\">" + std::string(name) + "</td><td>" + std::to_string(named) +
+            "</td>" + cells + "</tr>\n";
+  }
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(png->data()), png->size());
+  return "<section id=\"semantics\">\n<h2>Semantic map</h2>\n<figure><img style=\"max-width:100%\" "
+         "alt=\"Semantic map from above\" src=\"data:image/png;base64," +
+         base64(bytes) +
+         "\"></figure>\n<div class=\"scroll\"><table class=\"data\">\n<thead><tr>"
+         "<th class=\"word\">class</th><th>named</th><th>precision</th><th>recall</th><th>F1</th>"
+         "<th>position error, median</th><th>size error, median</th></tr></thead>\n<tbody>\n" +
+         rows + "</tbody>\n</table></div>\n</section>\n";
 }
 
 std::string timing_html(const Table& timing) {
@@ -252,12 +287,13 @@ std::string details_html(const RunRecord& run) {
 }  // namespace
 
 std::string run_report_html(const RunRecord& run) {
-  std::string html = header_html(run);
+  std::string html = run_header_html(run);
   html +=
       "<noscript><p class=\"notice\">The replay and the charts need JavaScript; the rest of "
       "this page does not.</p></noscript>\n";
   html += "<section id=\"replay\"></section>\n";
   html += map_html(run);
+  html += semantics_html(run);
   html += "<section id=\"against-time\"></section>\n";
   html +=
       "<div class=\"columns\">\n" + timing_html(run.timing) + events_html(run.events) + "</div>\n";

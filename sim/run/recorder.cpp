@@ -13,6 +13,8 @@
 #include "mapping/map_files.h"
 #include "run/summary.h"
 #include "scoring/figures.h"
+#include "semantics/cloud_file.h"
+#include "semantics/semantic_picture.h"
 
 namespace arex::sim {
 namespace {
@@ -192,6 +194,15 @@ void Recorder::write_cloud(const std::vector<Vec3f>& points_O,
 void Recorder::write_maps(const Mapper& mapper) {
   attempt([&] { mapper.global().write_octomap(directory_ / "map.bt"); });
   attempt([&] { write_map_2d(mapper.occupancy_2d(), directory_, "map2d"); });
+}
+
+void Recorder::write_semantics(const SemanticMap& map, const std::vector<Vec3f>& points_O,
+                               const std::vector<Vec3f>& path_O) {
+  attempt([&] {
+    write_semantic_pcd(directory_ / "semantic.pcd", {map.origin, points_O, {}}, map);
+  });
+  write_file("objects.csv", objects_csv(map));
+  write_file("semantic.png", png_bytes(draw_semantic_map(map, path_O)));
 }
 
 void Recorder::write_file(const std::string& name, const std::string& content) {

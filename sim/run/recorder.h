@@ -18,16 +18,18 @@
 #include "math/pose.h"
 #include "messages/events.h"
 #include "scoring/flight_scorer.h"
+#include "semantics/semantic_map.h"
 
 namespace arex::sim {
 
 /// Every file that a run, its report or a sweep writes into a run folder: what an older run in the
 /// same folder may have left. resolved.yaml stands last: it goes last, too.
-inline constexpr std::array<std::string_view, 19> kRunFiles{
-    "summary.json", "truth.tum",  "estimate.tum",  "coverage.csv",       "events.csv",
-    "timing.csv",   "cloud.pcd",  "map.bt",        "map2d.pgm",          "map2d.yaml",
-    "report.html",  "flight.csv", "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
-    "host.json",    "output.txt", "failure.json",  "resolved.yaml"};
+inline constexpr std::array<std::string_view, 22> kRunFiles{
+    "summary.json", "truth.tum",    "estimate.tum",  "coverage.csv",       "events.csv",
+    "timing.csv",   "cloud.pcd",    "map.bt",        "map2d.pgm",          "map2d.yaml",
+    "report.html",  "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
+    "semantic.pcd", "objects.csv",  "semantic.png",  "host.json",          "output.txt",
+    "failure.json", "resolved.yaml"};
 
 /// How many points the cloud had at a moment. Points are in the order of their first sight, so that
 /// the first `points` of cloud.pcd are the map of that moment.
@@ -59,6 +61,9 @@ class Recorder {
   void write_cloud(const std::vector<Vec3f>& points_O, const std::vector<CloudGrowth>& growth);
   /// map.bt, map2d.pgm and map2d.yaml.
   void write_maps(const Mapper& mapper);
+  /// semantic.pcd, objects.csv and semantic.png.
+  void write_semantics(const SemanticMap& map, const std::vector<Vec3f>& points_O,
+                       const std::vector<Vec3f>& path_O);
   /// A whole file of the folder, replaced atomically. @pre name is one of kRunFiles.
   void write_file(const std::string& name, const std::string& content);
   /// Flushes everything, then writes summary.json.

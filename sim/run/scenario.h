@@ -15,7 +15,10 @@
 #include "run/device_section.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
+#include "scoring/semantic_score.h"
 #include "scoring/thin_branches.h"
+#include "semantics/pcl_models.h"
+#include "semantics/semantic_config.h"
 #include "sensors/imu.h"
 #include "sensors/mocap_device.h"
 #include "stack/stack.h"
@@ -30,6 +33,7 @@ struct ScoringConfig {
   CoverageConfig coverage;
   MapErrorConfig map;
   ThinBranchConfig thin;
+  SemanticScoreConfig semantic;
 
   void fields(auto& f) {
     f("low_m", low_m, "lower edge of the space that counts as reachable, z in O");
@@ -37,7 +41,22 @@ struct ScoringConfig {
     f("coverage", coverage, "coverage of the reachable, visible truth");
     f("map", map, "distance of the map from the true surfaces");
     f("thin", thin, "thin branches seen in time");
+    f("semantic", semantic, "the semantic map against the world");
     f.check(low_m < high_m, "low_m < high_m");
+  }
+};
+
+/// The semantic map that an exploration ends with.
+struct MissionSemanticsConfig {
+  bool enabled = false;
+  SemanticConfig map;
+
+  void fields(auto& f) {
+    f("enabled", enabled,
+      "explorations end with a semantic map of their cloud, scored against the world; `arex "
+      "semantics RUN` makes it afterwards");
+    f.check(!enabled || has_pcl(), "enabled false, for this build has no PCL");
+    map.fields(f);
   }
 };
 
@@ -54,6 +73,7 @@ struct ScenarioConfig {
   std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
   StackConfig stack;
+  MissionSemanticsConfig semantics;
   ScoringConfig scoring;
 
   void fields(auto& f) {
@@ -69,6 +89,7 @@ struct ScenarioConfig {
       "...}");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
+    f("semantics", semantics, "what the mapped cloud shows");
     f("scoring", scoring, "what the truth is compared with");
     f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
                 !devices.contains("mocap"),

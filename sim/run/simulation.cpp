@@ -261,6 +261,21 @@ std::map<std::string, std::string> Simulation::device_hashes() const {
   return hashes;
 }
 
+SemanticScore Simulation::map_semantics(const std::vector<Vec3f>& cloud_O,
+                                        const std::vector<PosePair>& poses) const {
+  constexpr double kStep = 0.25;  // m, between points of the path
+  std::vector<Vec3f> path_O;
+  for (const PosePair& pose : poses) {
+    const Vec3f p = pose.X_OB.p.cast<float>();
+    if (path_O.empty() || (p - path_O.back()).norm() > static_cast<float>(kStep)) {
+      path_O.push_back(p);
+    }
+  }
+  const SemanticMap map = build_semantic_map(cloud_O, path_O, config_.semantics.map);
+  if (recorder_) recorder_->write_semantics(map, cloud_O, path_O);
+  return score_semantics(map, cloud_O, align_map(poses), world_, config_.scoring.semantic);
+}
+
 FlightResult Simulation::finish() {
   jobs_.drain();
   FlightResult result;
@@ -285,6 +300,10 @@ FlightResult Simulation::finish() {
     // Placed by the best rigid fit of the trajectory: the shape is the map's, its place the
     // odometry's.
     result.map = score_map(cloud, align_map(result.flight.poses), scene_, config_.scoring.map);
+    if (coverage_ && config_.semantics.enabled) {
+      const StageTimer::Scope timed(timers_.semantics);
+      result.semantic = map_semantics(cloud, result.flight.poses);
+    }
   }
   if (coverage_) result.coverage = coverage_->result();
   result.exploration = exploration_;
@@ -295,7 +314,7 @@ FlightResult Simulation::finish() {
   result.battery = physics_.battery();
   if (result.device_hashes.contains("depth")) result.renderer = Renderer::kName;
   for (const StageTimer* timer : {&timers_.devices, &timers_.stack, &timers_.autopilot,
-                                  &timers_.physics, &timers_.recording}) {
+                                  &timers_.physics, &timers_.recording, &timers_.semantics}) {
     result.timing.push_back(timing_row(timer->name(), timer->seconds()));
   }
   for (const auto& lane : jobs_.timings()) {

@@ -16,6 +16,7 @@
 #include "run/stage_timer.h"
 #include "scoring/flight_scorer.h"
 #include "scoring/map_error.h"
+#include "scoring/semantic_score.h"
 #include "sensors/device.h"
 #include "sensors/scene.h"
 #include "stack/flight_software.h"
@@ -59,6 +60,7 @@ struct FlightResult {
   FlightScore flight;
   std::optional<MapScore> map;             ///< nothing without a map
   std::optional<CoverageResult> coverage;  ///< of explorations
+  std::optional<SemanticScore> semantic;   ///< of explorations that make a semantic map
   ExplorationLog exploration;
   PlanCounts plans;
   BatteryState battery;
@@ -109,10 +111,12 @@ class Simulation {
   void write_cloud();
   void note_cloud_growth();
   void score_coverage();
+  [[nodiscard]] SemanticScore map_semantics(const std::vector<Vec3f>& cloud_O,
+                                            const std::vector<PosePair>& poses) const;
 
   struct Timers {
     StageTimer devices{"devices"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
-        recording{"recording"};
+        recording{"recording"}, semantics{"semantics"};
   };
 
   ScenarioConfig config_;

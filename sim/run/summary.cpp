@@ -113,6 +113,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   figures.set("odometry.source", scenario.config.stack.odometry.source);
   if (result.map) add_figures(*result.map, figures);
   if (result.coverage) add_figures(*result.coverage, figures);
+  if (result.semantic) add_figures(*result.semantic, figures);
   result.exploration.add_figures(figures);
   return figures.json();
 }

@@ -206,6 +206,28 @@ std::vector<FigureInfo> flight_figures() {
   return list;
 }
 
+// The classes of scoring/semantic_score.h.
+std::vector<FigureInfo> semantic_figures() {
+  std::vector<FigureInfo> list;
+  for (const std::string name : {"trunk", "pillar", "car", "wall", "ramp", "door"}) {
+    const bool main = name == "trunk" || name == "pillar" || name == "car";
+    const std::string key = "semantic." + name + ".";
+    list.push_back({key + "precision", name + "s: precision", "", kMore, false,
+                    "of those that the semantic map names, the share that is there"});
+    list.push_back({key + "recall", name + "s: recall", "", kMore, false,
+                    "of those that were mapped, the share that the semantic map names"});
+    list.push_back({key + "f1", name + "s found, F1", "", kMore, main,
+                    "harmonic mean of precision and recall; null if none was mapped"});
+    list.push_back({key + "position_median_m", name + "s: position error, median", "m", kLess,
+                    false, "of those found rightly, horizontal"});
+    list.push_back({key + "size_median_m", name + "s: size error, median", "m", kLess, false,
+                    name == "trunk"  ? "diameter at breast height, where half of it was mapped"
+                    : name == "wall" ? "walls have no size that is compared: null"
+                                     : "longer side from above, where half of it was mapped"});
+  }
+  return list;
+}
+
 // Each: file, column, unit, meaning.
 
 std::vector<ColumnInfo> flight_columns() {
@@ -298,6 +320,24 @@ std::vector<ColumnInfo> map_and_decision_columns() {
   };
 }
 
+std::vector<ColumnInfo> semantic_columns() {
+  return {
+      {"objects.csv", "class", "", "trunk, pillar, car, wall, ramp or door"},
+      {"objects.csv", "x_m", "m",
+       "of its middle (a trunk's at breast height) in the cloud's frame"},
+      {"objects.csv", "y_m", "m", "likewise"},
+      {"objects.csv", "z_m", "m", "likewise"},
+      {"objects.csv", "length_m", "m", "a trunk's diameter at breast height"},
+      {"objects.csv", "width_m", "m", "a trunk's diameter again"},
+      {"objects.csv", "height_m", "m", "of the tree or thing above its base"},
+      {"objects.csv", "yaw_rad", "rad", "direction of its length"},
+      {"objects.csv", "base_z_m", "m", "height of the ground or floor under it"},
+      {"objects.csv", "canopy_diameter_m", "m", "of a circle with the area of a tree's crown"},
+      {"objects.csv", "seen_fraction", "1", "share of a trunk's girth that shows bark"},
+      {"objects.csv", "confidence", "", "0 to 1"},
+  };
+}
+
 std::vector<ColumnInfo> sweep_columns() {
   return {
       {"sweep.csv", "run", "", "folder of the run"},
@@ -347,16 +387,16 @@ std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
 }  // namespace
 
 const std::vector<FigureInfo>& figure_list() {
-  static const auto list =
-      joined<FigureInfo>({run_figures(), coverage_figures(), exploration_figures(), map_figures(),
-                          odometry_source_figures(), odometry_figures("odometry.", true),
-                          odometry_figures("odometries.NAME.", false), flight_figures()});
+  static const auto list = joined<FigureInfo>(
+      {run_figures(), coverage_figures(), exploration_figures(), map_figures(),
+       odometry_source_figures(), odometry_figures("odometry.", true),
+       odometry_figures("odometries.NAME.", false), semantic_figures(), flight_figures()});
   return list;
 }
 
 const std::vector<ColumnInfo>& column_list() {
-  static const auto list =
-      joined<ColumnInfo>({flight_columns(), map_and_decision_columns(), sweep_columns()});
+  static const auto list = joined<ColumnInfo>(
+      {flight_columns(), map_and_decision_columns(), semantic_columns(), sweep_columns()});
   return list;
 }
 

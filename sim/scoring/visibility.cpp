@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 namespace arex::sim {
@@ -30,7 +29,7 @@ Ray sight_line(const Vec3& viewpoint_W, const SurfaceSample& sample, double rang
 }
 
 double min_cosine(const VisibilityConfig& config) {
-  return std::cos(config.max_incidence_deg * std::numbers::pi / 180);
+  return std::cos(to_radians(config.max_incidence_deg));
 }
 
 // Sample indices sorted by the cube they lie in.

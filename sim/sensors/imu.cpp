@@ -6,7 +6,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 // Scale height of the standard atmosphere near the ground: R T / (M g), 288.15 K.
 constexpr double kScaleHeight_m = 8.314462618 * 288.15 / (0.0289644 * kGravity);
 
@@ -15,7 +14,7 @@ bool due(Stamp stamp, int rate_hz) { return stamp % (kNanosecondsPerSecond / rat
 }  // namespace
 
 ImuModel::Triad ImuModel::make_triad(const ImuConfig& config, bool gyro, std::uint64_t seed) {
-  const double root_rate = std::sqrt(1 / kTick_s), root_tick = std::sqrt(kTick_s);
+  const double root_rate = std::sqrt(1 / kSecondsPerTick), root_tick = std::sqrt(kSecondsPerTick);
   Triad triad{
       .white_sigma = (gyro ? config.gyro_noise_density : config.accel_noise_density) * root_rate,
       .walk_sigma = (gyro ? config.gyro_walk_density : config.accel_walk_density) * root_tick,
@@ -93,7 +92,7 @@ Vec3 ImuModel::Triad::measure(const Vec3& value) {
 
 // Bilinear transform of 1 / (s^2 + sqrt(2) s + 1), pre-warped to the cut-off.
 ImuModel::LowPass::LowPass(double cutoff_hz) {
-  const double k = std::tan(std::numbers::pi * cutoff_hz * kTick_s);
+  const double k = std::tan(std::numbers::pi * cutoff_hz * kSecondsPerTick);
   const double norm = 1 / (1 + std::numbers::sqrt2 * k + k * k);
   b0 = k * k * norm;
   a1 = 2 * (k * k - 1) * norm;

@@ -6,7 +6,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTick_s = to_seconds(kNanosecondsPerTick);
 constexpr double kPi = std::numbers::pi;
 // Seen from above, in MotorCommand's order.
 constexpr std::array<double, 4> kTurningSense{1, 1, -1, -1};
@@ -77,7 +76,7 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
   for (double& unbalance : unbalance_) unbalance /= std::sqrt(squares);
 
   // White noise of variance 1 at 1 kHz has a one-sided density of sqrt(2 / 1000).
-  const double white = std::sqrt(0.5 / kTick_s) * config.scale;
+  const double white = std::sqrt(0.5 / kSecondsPerTick) * config.scale;
   shapers_[0] = wash_shaper();
   for (std::size_t m = 0; m < kModes.size(); ++m) {
     shapers_[m + 1] = mode_shaper(kModes[m].frequency_hz, kModes[m].damping);
@@ -92,8 +91,8 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
 
   // q'' + 2 z w q' + w^2 q = alpha, alpha constant over the tick.
   const double w = 2 * kPi * config.frame_mode_hz, z = config.frame_mode_damping;
-  const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kTick_s);
-  const double c = std::cos(wd * kTick_s), s = std::sin(wd * kTick_s);
+  const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kSecondsPerTick);
+  const double c = std::cos(wd * kSecondsPerTick), s = std::sin(wd * kSecondsPerTick);
   transition_ << decay * (c + z * w / wd * s), decay * s / wd, -decay * w * w / wd * s,
       decay * (c - z * w / wd * s);
   const Eigen::Vector2d rest(1 / (w * w), 0);  // where a constant unit alpha ends
@@ -102,7 +101,7 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
 
 // Bilinear transforms, pre-warped to the frequency: s^2 / (s^2 + sqrt(2) s + 1) ...
 VibrationModel::Shaper VibrationModel::wash_shaper() {
-  const double k = std::tan(kPi * kWashFrom_hz * kTick_s);
+  const double k = std::tan(kPi * kWashFrom_hz * kSecondsPerTick);
   const double norm = 1 / (1 + std::numbers::sqrt2 * k + k * k);
   Shaper shaper;
   shaper.b0 = shaper.b2 = norm;
@@ -114,7 +113,7 @@ VibrationModel::Shaper VibrationModel::wash_shaper() {
 
 // ... and 2 z s / (s^2 + 2 z s + 1), which is 1 at its middle.
 VibrationModel::Shaper VibrationModel::mode_shaper(double frequency_hz, double damping) {
-  const double k = std::tan(kPi * frequency_hz * kTick_s);
+  const double k = std::tan(kPi * frequency_hz * kSecondsPerTick);
   const double norm = 1 / (1 + 2 * damping * k + k * k);
   Shaper shaper;
   shaper.b0 = 2 * damping * k * norm;
@@ -169,7 +168,7 @@ VibrationModel::Lines VibrationModel::lines(const std::array<double, kRotors>& r
   Lines lines;
   for (std::size_t i = 0; i < kRotors; ++i) {
     const double speed = rotor_radps[i], ratio = speed / config_.reference_speed_radps;
-    angle_rad_[i] = std::fmod(angle_rad_[i] + speed * kTick_s, 2 * kPi);
+    angle_rad_[i] = std::fmod(angle_rad_[i] + speed * kSecondsPerTick, 2 * kPi);
     const double growth = config_.scale * unbalance_[i] * ratio * ratio;
     const double turned_c = std::cos(angle_rad_[i]), turned_s = std::sin(angle_rad_[i]);
     for (std::size_t axis = 0; axis < kAxes; ++axis) {

@@ -14,7 +14,6 @@ namespace {
 constexpr int kLines = Mid360Pattern::kLines;
 constexpr int kShots = Mid360Pattern::kShotsPerTick;
 constexpr int kBeams = kLines * kShots;
-constexpr std::size_t kPacket = 8;
 
 // A false alarm is faint [E].
 constexpr int kFalseAlarmIntensity = 10;
@@ -23,8 +22,6 @@ constexpr int kFalseAlarmIntensity = 10;
 constexpr float kModerateMargin = 2, kLowMargin = 1.3F;
 // A merged echo that lies further than this share of their distance from both surfaces [E].
 constexpr float kLowMergedShare = 0.2F;
-
-constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 bool within(Stamp stamp, double from_s, double for_s) {
   return stamp >= from_seconds(from_s) && stamp < from_seconds(from_s + for_s);
@@ -234,7 +231,7 @@ void Mid360::split_beams(Tick& tick) const {
   // with the first one's. Where the two lie on different surfaces the device reports a range
   // between them.
   const auto separation = static_cast<float>(config_.echo_separation_m);
-  const auto half_width = static_cast<float>(radians(config_.beam_half_angle_deg));
+  const auto half_width = static_cast<float>(to_radians(config_.beam_half_angle_deg));
   const auto merged_share = static_cast<float>(config_.merged_share);
   const auto edge_step = static_cast<float>(config_.edge_step_m);
   std::array<Ray, kBeams> rays;
@@ -288,7 +285,7 @@ void Mid360::receive(const Tick& tick, Stamp scan_stamp, std::vector<LidarPoint>
   const auto false_below = static_cast<std::uint64_t>(std::round(false_alarm * 0x1p32));
   const auto kept = static_cast<float>(1 - config_.fault_dropout_fraction);
   const auto blind = static_cast<float>(echo.blind_m);
-  const auto angle_sigma = static_cast<float>(radians(echo.angle_noise_deg));
+  const auto angle_sigma = static_cast<float>(to_radians(echo.angle_noise_deg));
   const auto offset = static_cast<std::uint32_t>(tick.stamp - scan_stamp);
   for (std::size_t i = 0; i < kBeams; ++i) {
     const RayHit& hit = tick.hits[i];

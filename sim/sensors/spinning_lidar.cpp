@@ -10,8 +10,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180; }
-
 /// The vehicle at a time between two ticks.
 Pose between(const Truth& from, const Truth& to, Stamp stamp) {
   const double share =
@@ -41,7 +39,7 @@ SpinningLidar::SpinningLidar(const SpinningLidarConfig& config, const Scene& sce
   for (int i = 0; i < config.rings; ++i) {
     const double share = config.rings > 1 ? static_cast<double>(i) / (config.rings - 1) : 0.5;
     const double elevation =
-        radians(config.lowest_deg + share * (config.highest_deg - config.lowest_deg));
+        to_radians(config.lowest_deg + share * (config.highest_deg - config.lowest_deg));
     fan_L_.emplace_back(std::cos(elevation), 0, std::sin(elevation));
   }
 }

@@ -19,7 +19,7 @@
 namespace arex::sim {
 namespace {
 
-constexpr off_t kKeptOutput = 16 << 20;
+constexpr off_t kMostOutput = 16 << 20;
 
 // A SIGHUP that is ignored on purpose, as under nohup, stays ignored.
 sigset_t gate_signals() {
@@ -100,7 +100,7 @@ double ChildProcess::age_s() const {
 
 std::string ChildProcess::output() const {
   const off_t size = lseek(output_, 0, SEEK_END);
-  const off_t from = std::max<off_t>(0, size - kKeptOutput);
+  const off_t from = std::max<off_t>(0, size - kMostOutput);
   std::string text(static_cast<std::size_t>(std::max<off_t>(0, size - from)), '\0');
   const ssize_t count = pread(output_, text.data(), text.size(), from);
   text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, count)));

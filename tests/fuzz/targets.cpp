@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "autonomy/semantics/cloud_bytes.h"
 #include "config/config.h"
 #include "evaluation/comparison.h"
 #include "fuzz/corpus.h"
@@ -16,6 +17,8 @@
 #include "report/run_report.h"
 #include "run/requirement.h"
 #include "run/scenario.h"
+#include "semantics/cloud_file.h"
+#include "semantics/semantic_map.h"
 #include "support/temporary_folder.h"
 #include "sweep/slurm.h"
 #include "sweep/sweep_folder.h"
@@ -149,6 +152,17 @@ void read_sweep_folder(const fs::path& folder, RandomStream& random) {
   static_cast<void>(sweep.state("2"));
 }
 
+// A cloud in each encoding, and what is read of it as a map.
+void read_cloud(const fs::path& folder, RandomStream& random) {
+  static const std::vector<std::string> sound = all_encodings(some_points(150));
+  const std::string& bytes =
+      sound[static_cast<std::size_t>(random.uniform_int(0, static_cast<int>(sound.size()) - 1))];
+  write_text(folder / "cloud", damage_bytes(bytes, sound, random));
+  const CloudFile cloud = read_cloud_file(folder / "cloud");
+  const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+  if (map.labels.size() != cloud.points.size()) throw std::runtime_error("labels got lost");
+}
+
 }  // namespace
 
 std::vector<Target> all_targets() {
@@ -164,6 +178,7 @@ std::vector<Target> all_targets() {
           {"batch", read_batch},
           {"sweep folder", read_sweep_folder},
           {"world file", read_world_file},
+          {"cloud", read_cloud},
           {"scenario, too", read_scenario}};
 }
 

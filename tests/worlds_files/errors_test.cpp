@@ -91,9 +91,9 @@ TEST_F(FileErrors, DamagedFilesAreOneLine) {
               "x\nend_header\n1\n"),
          "ends before its data does");
   expect(said("x.pcd",
-              "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1000000000\n"
-              "HEIGHT 1\nPOINTS 1000000000\nDATA binary\nabc"),
-         "ends before its data does");
+              "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 100000000\n"
+              "HEIGHT 1\nPOINTS 100000000\nDATA binary\nabc"),
+         "has 3 bytes of points, expected 100000000 points");
   EXPECT_NE(said("x.bt", "# Octomap OcTree binary file\nid OcTree\nsize 100\nres 0.1\ndata\nzz"),
             "");
   EXPECT_NE(said("x.gltf", "{\"asset\":"), "");

@@ -1,0 +1,235 @@
+#include "semantics/forest_reading.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+#include "semantics/ground_model.h"
+#include "semantics/stem_detector.h"
+
+namespace arex {
+namespace {
+
+constexpr double kGroundThickness = 0.12;  // m, roughness and noise of the ground's points
+constexpr double kBark = 0.06;             // m, a stem's points lie this near to its surface
+constexpr double kStemStep = 0.25;         // m, of following a stem
+constexpr double kBridge = 1.0;            // m, without points along a stem
+constexpr double kCrownReach = 4.0;        // m, from a stem to the points of its crown
+constexpr double kCrownBase = 1.5;         // m above the ground, of what counts as canopy
+constexpr double kCanopyCell = 0.25;       // m
+constexpr std::size_t kTop = 5;            // the highest points may be false echoes
+
+/// The part of a stem at one height.
+struct Ring {
+  double height;
+  Vec2 centre;
+  double radius;
+};
+
+/// Follows a stem from its fit in one direction.
+class StemFollower {
+ public:
+  StemFollower(const WorkingCloud& cloud, const ColumnIndex& index,
+               const std::vector<float>& heights)
+      : cloud_(cloud), index_(index), heights_(heights) {}
+
+  /// Rings from the given height on, `step` apart, ending where the stem's points do.
+  [[nodiscard]] std::vector<Ring> follow(const Stem& stem, double from, double step,
+                                         double until) const {
+    std::vector<Ring> rings;
+    Vec2 centre = stem.centre_at(from), lean = stem.lean;
+    std::size_t sure = 0;
+    double missing = 0;
+    for (double h = from; step > 0 ? h <= until : h >= until; h += step) {
+      const double radius = stem.radius_at(h);
+      if (const auto found = fit_centre(centre, radius, h)) {
+        const Vec2 drift = (*found - centre) / step;
+        lean += 0.2 * drift;
+        centre = *found;
+        missing = 0;
+        rings.push_back({h, centre, radius});
+        sure = rings.size();
+      } else {
+        missing += std::abs(step);
+        rings.push_back({h, centre, radius});
+      }
+      if (missing > kBridge) break;
+      centre += step * lean;
+    }
+    rings.resize(sure);
+    return rings;
+  }
+
+ private:
+  /// The centre of a circle of known radius near a guess; nothing if too few points lie on it.
+  [[nodiscard]] std::optional<Vec2> fit_centre(const Vec2& guess, double radius, double h) const {
+    constexpr std::size_t kFewest = 4;
+    std::vector<Vec2> points;
+    index_.within(static_cast<float>(guess.x()), static_cast<float>(guess.y()),
+                  static_cast<float>(radius + 0.15), [&](std::uint32_t i) {
+                    if (std::abs(static_cast<double>(heights_[i]) - h) > kStemStep) return;
+                    points.emplace_back(cloud_.points[i].head<2>().cast<double>());
+                  });
+    if (points.size() < kFewest) return std::nullopt;
+    Vec2 centre = guess;
+    for (int round = 0; round < 6; ++round) {
+      Eigen::Matrix2d A = Eigen::Matrix2d::Identity();  // keeps a one-sided arc in place
+      Vec2 b = guess - centre;
+      for (const Vec2& p : points) {
+        const Vec2 out = p - centre;
+        const double norm = std::max(1e-6, out.norm());
+        const double d = norm - radius;
+        const double weight = 1 / std::pow(1 + d * d / (0.05 * 0.05), 2);
+        const Vec2 u = out / norm;
+        A += weight * u * u.transpose();
+        b += weight * d * u;
+      }
+      centre += A.inverse() * b;
+    }
+    const auto on_bark =
+        static_cast<std::size_t>(std::count_if(points.begin(), points.end(), [&](const Vec2& p) {
+          return std::abs((p - centre).norm() - radius) < kBark;
+        }));
+    const bool kept = 2 * on_bark >= points.size() && on_bark >= kFewest;
+    return kept && (centre - guess).norm() < 0.15 ? std::optional(centre) : std::nullopt;
+  }
+
+  const WorkingCloud& cloud_;
+  const ColumnIndex& index_;
+  const std::vector<float>& heights_;
+};
+
+/// The nearest of some places, by buckets.
+class NearestStem {
+ public:
+  explicit NearestStem(const std::vector<StemEvidence>& stems, const WorkingCloud& cloud)
+      : stems_(stems),
+        buckets_(cloud.low.head<2>().cast<double>(), cloud.high.head<2>().cast<double>(),
+                 kCrownReach, 0),
+        lists_(buckets_.values.size()) {
+    for (std::size_t i = 0; i < stems.size(); ++i) {
+      const Vec2& c = stems[i].stem.centre;
+      lists_[buckets_.cell_of(c.x(), c.y())].push_back(i);
+    }
+  }
+  /// Index of the stem within kCrownReach, or the number of stems.
+  [[nodiscard]] std::size_t at(const Vec2& p) const {
+    std::size_t best = stems_.size();
+    double least = kCrownReach;
+    const int column = buckets_.column_of(p.x()), row = buckets_.row_of(p.y());
+    for (int r = row - 1; r <= row + 1; ++r) {
+      for (int c = column - 1; c <= column + 1; ++c) {
+        if (!buckets_.contains(c, r)) continue;
+        for (const std::size_t i : lists_[buckets_.index(c, r)]) {
+          const double distance = (stems_[i].stem.centre - p).norm();
+          if (distance < least) {
+            least = distance;
+            best = i;
+          }
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  const std::vector<StemEvidence>& stems_;
+  Raster buckets_;
+  std::vector<std::vector<std::size_t>> lists_;
+};
+
+void label_stem(const std::vector<Ring>& rings, const ColumnIndex& index,
+                const std::vector<float>& heights, std::vector<SemanticClass>& labels) {
+  for (const Ring& ring : rings) {
+    index.within(static_cast<float>(ring.centre.x()), static_cast<float>(ring.centre.y()),
+                 static_cast<float>(ring.radius + kBark), [&](std::uint32_t i) {
+                   const double h = static_cast<double>(heights[i]);
+                   if (std::abs(h - ring.height) > 0.5 * kStemStep + 1e-6 || h < kGroundThickness) {
+                     return;
+                   }
+                   labels[i] = SemanticClass::kTrunk;
+                 });
+  }
+}
+
+/// What a stem's neighbourhood says of its tree.
+struct Crown {
+  std::vector<float> highest;  ///< z of the kTop highest points, falling
+  std::vector<std::uint64_t> cells;
+  void add(float z, std::uint64_t cell, bool canopy) {
+    if (highest.size() < kTop || z > highest.back()) {
+      highest.insert(std::upper_bound(highest.begin(), highest.end(), z, std::greater<>()), z);
+      if (highest.size() > kTop) highest.pop_back();
+    }
+    if (canopy && (cells.empty() || cells.back() != cell)) cells.push_back(cell);
+  }
+  [[nodiscard]] double diameter() {
+    std::sort(cells.begin(), cells.end());
+    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+    const double area = static_cast<double>(cells.size()) * kCanopyCell * kCanopyCell;
+    return 2 * std::sqrt(area / std::numbers::pi);
+  }
+};
+
+}  // namespace
+
+SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config) {
+  SceneReading reading;
+  reading.ground = fit_ground(cloud, config.ground_cell_m);
+  reading.heights = heights_above(cloud.points, reading.ground);
+  reading.labels.assign(cloud.points.size(), SemanticClass::kUnlabelled);
+  const std::vector<float>& heights = reading.heights;
+  const ColumnIndex index(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
+  const std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
+
+  const StemFollower follower(cloud, index, heights);
+  for (const StemEvidence& e : stems) {
+    constexpr double kHighest = 60;
+    std::vector<Ring> rings = follower.follow(e.stem, kBreastHeight, kStemStep, kHighest);
+    const std::vector<Ring> down =
+        follower.follow(e.stem, kBreastHeight - kStemStep, -kStemStep, 0);
+    rings.insert(rings.end(), down.begin(), down.end());
+    label_stem(rings, index, heights, reading.labels);
+  }
+
+  const NearestStem nearest(stems, cloud);
+  std::vector<Crown> crowns(stems.size() + 1);
+  const Raster canopy(cloud.low.head<2>().cast<double>(), cloud.high.head<2>().cast<double>(),
+                      std::max(kCanopyCell, WorkingCloud::kCell), 0);
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const auto h = static_cast<double>(heights[i]);
+    SemanticClass& label = reading.labels[i];
+    const Vec2 p = cloud.points[i].head<2>().cast<double>();
+    const std::size_t tree = nearest.at(p);
+    if (label == SemanticClass::kUnlabelled) {
+      label = std::abs(h) <= kGroundThickness ? SemanticClass::kGround
+              : h < -kGroundThickness         ? SemanticClass::kUnlabelled
+              : h < kCrownBase                ? SemanticClass::kUndergrowth
+                                              : SemanticClass::kCanopy;
+    }
+    if (h > kGroundThickness) {
+      crowns[tree].add(cloud.points[i].z(), canopy.cell_of(p.x(), p.y()), h > kCrownBase);
+    }
+  }
+  for (std::size_t i = 0; i < stems.size(); ++i) {
+    const StemEvidence& e = stems[i];
+    const double ground = reading.ground.interpolate(e.stem.centre.x(), e.stem.centre.y());
+    SemanticObject object;
+    object.kind = SemanticClass::kTrunk;
+    object.position = {e.stem.centre.x(), e.stem.centre.y(), ground + kBreastHeight};
+    const double height =
+        crowns[i].highest.empty() ? 0 : static_cast<double>(crowns[i].highest.back()) - ground;
+    object.size = {2 * e.stem.radius, 2 * e.stem.radius, height};
+    object.base_z = ground;
+    object.canopy_diameter = crowns[i].diameter();
+    object.seen_fraction = e.seen_fraction;
+    object.confidence = e.confidence();
+    reading.objects.push_back(object);
+  }
+  return reading;
+}
+
+}  // namespace arex

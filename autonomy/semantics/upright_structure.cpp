@@ -1,0 +1,403 @@
+#include "semantics/upright_structure.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <set>
+
+#include "semantics/pcl_models.h"
+
+namespace arex {
+namespace {
+
+constexpr double kBandLow = 2.05;       // m above the floor: cars and cabinets end below
+constexpr double kBandHigh = 2.75;      // m above the floor
+constexpr double kBelowCeiling = 0.55;  // m: beams and pipes hang lower
+constexpr double kLeastBand = 0.4;      // m
+constexpr double kOnLine = 0.06;        // m, from a wall's line
+constexpr double kTaken = 0.09;         // m, from a wall's face: no pillar's
+constexpr double kWallGap = 1.0;        // m, a pillar or a door in a wall
+constexpr double kLeastWall = 1.0;      // m, of covered length: more than a pillar's side
+constexpr double kStraight = 0.03;      // m, deviation of a wall's points from its line
+constexpr double kCovered = 0.6;        // of a wall's length
+constexpr double kClusterStep = 0.25;   // m, between points of one cluster
+
+struct Band {
+  std::vector<Vec3f> points;
+  std::vector<std::uint32_t> of_cloud;
+};
+
+bool in_band(float above_floor, float room) {
+  const double high = std::min(kBandHigh, static_cast<double>(room) - kBelowCeiling);
+  const double low = std::min(kBandLow, high - kLeastBand);
+  return static_cast<double>(above_floor) >= low && static_cast<double>(above_floor) <= high;
+}
+
+Band band_of(const WorkingCloud& cloud, const Clearances& clearances) {
+  Band band;
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (!in_band(clearances.above_floor[i], clearances.room[i])) continue;
+    band.points.push_back(cloud.points[i]);
+    band.of_cloud.push_back(static_cast<std::uint32_t>(i));
+  }
+  return band;
+}
+
+/// The line through points: a point on it and its direction.
+struct Line {
+  Vec2 p = Vec2::Zero(), u = Vec2::UnitX();
+  double across = 0;  ///< deviation of the points from it
+  [[nodiscard]] double distance(const Vec2& q) const {
+    return std::abs(u.x() * (q - p).y() - u.y() * (q - p).x());
+  }
+};
+
+Line line_through(const std::vector<Vec2>& points) {
+  Line line;
+  for (const Vec2& q : points) line.p += q / static_cast<double>(points.size());
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (const Vec2& q : points) {
+    spread += (q - line.p) * (q - line.p).transpose() / static_cast<double>(points.size());
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(spread);
+  line.u = solver.eigenvectors().col(1);
+  line.across = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+  return line;
+}
+
+/// The line through a place that most points around it lie on, refined on those. A thin wall's
+/// other face is near, too: the points as a whole would not do.
+std::optional<Line> local_line(const std::vector<Vec2>& near, const Vec2& place) {
+  constexpr std::size_t kFewest = 6;
+  constexpr double kLeastArm = 0.15;  // m
+  std::vector<Vec2> best;
+  for (const Vec2& q : near) {
+    const Vec2 arm = q - place;
+    if (arm.norm() < kLeastArm) continue;
+    const Line line{place, arm.normalized(), 0};
+    std::vector<Vec2> on;
+    for (const Vec2& p : near) {
+      if (line.distance(p) < 0.5 * kOnLine) on.push_back(p);
+    }
+    if (on.size() > best.size()) best = std::move(on);
+  }
+  if (best.size() < kFewest) return std::nullopt;
+  return line_through(best);
+}
+
+/// Grows wall faces in one storey's band.
+class WallGrower {
+ public:
+  WallGrower(const Band& band, const ColumnIndex& index)
+      : band_(band), index_(index), free_(band.points.size(), 1) {}
+
+  /// The long ones first, so that no short line takes a piece of a long one askew.
+  std::vector<WallFace> grow_all() {
+    std::vector<WallFace> walls;
+    for (const double least : {8.0, 3.0, kLeastWall}) {
+      std::set<std::uint64_t> tried;
+      for (std::size_t i = 0; i < band_.points.size(); ++i) {
+        if (free_[i] == 0 || tried.count(cell(i)) > 0) continue;
+        if (auto wall = grow_from(i, least)) {
+          for (std::size_t k : members(*wall, kTaken)) free_[k] = 0;
+          walls.push_back(*wall);
+        } else {
+          tried.insert(cell(i));
+        }
+      }
+    }
+    return walls;
+  }
+  [[nodiscard]] const std::vector<std::uint8_t>& free() const { return free_; }
+
+ private:
+  [[nodiscard]] std::uint64_t cell(std::size_t i) const {  // one try in each 0.2 m, each storey
+    const Vec3f c = (band_.points[i] / 0.2F).array().floor();
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(c.x()) * 2000003 +
+                                      static_cast<std::int64_t>(c.y())) *
+               64 +
+           static_cast<std::uint64_t>(static_cast<std::int64_t>(c.z() / 10) & 63);
+  }
+
+  std::optional<WallFace> grow_from(std::size_t seed, double least) const {
+    constexpr float kLocal = 0.4F, kStorey = 1.5F;  // m
+    constexpr std::size_t kFewest = 6;
+    const Vec3f& s = band_.points[seed];
+    std::vector<Vec2> near;
+    index_.within(s.x(), s.y(), kLocal, [&](std::uint32_t i) {
+      if (free_[i] != 0 && std::abs(band_.points[i].z() - s.z()) < kStorey) {
+        near.push_back(flat(band_.points[i]));
+      }
+    });
+    if (near.size() < kFewest) return std::nullopt;
+    const auto start = local_line(near, flat(s));
+    if (!start) return std::nullopt;
+    Line line = *start;
+    WallFace wall;
+    for (int round = 0; round < 12; ++round) {
+      const double before = round == 0 ? 0 : wall.length();
+      std::vector<Vec2> taken;
+      if (!extend(line, flat(s), s.z(), wall, taken)) return std::nullopt;
+      line = line_through(taken);
+      if (round > 1 && wall.length() < before + 0.05) break;
+    }
+    if (wall.length() < least || line.across > kStraight) return std::nullopt;
+    return wall;
+  }
+
+  /// What of the line around a point is covered without a wide gap.
+  bool extend(const Line& line, const Vec2& from, float z, WallFace& wall,
+              std::vector<Vec2>& taken) const {
+    constexpr double kBin = 0.1;
+    constexpr float kStorey = 1.5F;
+    const double start = (from - line.p).dot(line.u);
+    double ends[2] = {start, start};
+    std::size_t filled = 0;
+    float low = z, high = z;
+    for (const int side : {-1, 1}) {
+      double gap = 0;
+      for (double t = start + (side > 0 ? 0 : -kBin); gap <= kWallGap; t += side * kBin) {
+        const Vec2 middle = line.p + (t + 0.5 * kBin) * line.u;
+        const std::size_t before = taken.size();
+        index_.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
+                      static_cast<float>(0.5 * kBin + kOnLine), [&](std::uint32_t i) {
+                        const Vec2 p = flat(band_.points[i]);
+                        const double at = (p - line.p).dot(line.u);
+                        if (free_[i] == 0 || line.distance(p) > kOnLine || at < t || at >= t + kBin)
+                          return;
+                        if (std::abs(band_.points[i].z() - z) > kStorey) return;
+                        taken.push_back(p);
+                        low = std::min(low, band_.points[i].z());
+                        high = std::max(high, band_.points[i].z());
+                      });
+        if (taken.size() > before) {
+          ++filled;
+          gap = 0;
+          ends[side > 0 ? 1 : 0] = side > 0 ? t + kBin : t;
+        } else {
+          gap += kBin;
+        }
+      }
+    }
+    const double length = ends[1] - ends[0];
+    const double covered = static_cast<double>(filled) * kBin;
+    if (taken.size() < 6 || covered < kCovered * length || covered < kLeastWall - kBin)
+      return false;
+    wall.a = line.p + ends[0] * line.u;
+    wall.b = line.p + ends[1] * line.u;
+    wall.low = static_cast<double>(low);
+    wall.high = static_cast<double>(high);
+    wall.points = static_cast<int>(taken.size());
+    return true;
+  }
+
+  [[nodiscard]] std::vector<std::size_t> members(const WallFace& wall, double within) const {
+    std::vector<std::size_t> out;
+    const int steps = std::max(1, static_cast<int>(std::ceil(wall.length() / 0.5)));
+    for (int k = 0; k <= steps; ++k) {
+      const Vec2 p = wall.a + static_cast<double>(k) / steps * (wall.b - wall.a);
+      index_.within(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.5F,
+                    [&](std::uint32_t i) {
+                      const auto z = static_cast<double>(band_.points[i].z());
+                      if (free_[i] != 0 && z > wall.low - 0.5 && z < wall.high + 0.5 &&
+                          wall.distance(flat(band_.points[i])) <= within) {
+                        out.push_back(i);
+                      }
+                    });
+    }
+    return out;
+  }
+
+  const Band& band_;
+  const ColumnIndex& index_;
+  std::vector<std::uint8_t> free_;
+};
+
+/// Whether things reach up through the metre below the band, and to the floor as far as one can
+/// see.
+bool reaches_down(const Rectangle& box, const ColumnIndex& index, const WorkingCloud& cloud,
+                  const Clearances& clearances, double base_z, Pillar& pillar) {
+  constexpr double kLayer = 0.15, kFrom = 0.9, kSlack = 0.1;  // m
+  const int layers = static_cast<int>((kBandLow - kFrom) / kLayer);
+  std::vector<bool> filled(static_cast<std::size_t>(layers), false);
+  const double reach = 0.5 * std::hypot(box.length, box.width) + kSlack;
+  double top = base_z;
+  index.within(static_cast<float>(box.centre.x()), static_cast<float>(box.centre.y()),
+               static_cast<float>(reach), [&](std::uint32_t i) {
+                 const double h = static_cast<double>(clearances.above_floor[i]);
+                 const auto z = static_cast<double>(cloud.points[i].z());
+                 if (std::abs(z - h - base_z) > 0.5 || box.distance(flat(cloud.points[i])) > kSlack)
+                   return;
+                 top = std::max(top, z);
+                 const double layer = (h - kFrom) / kLayer;
+                 if (layer >= 0 && layer < layers) filled[static_cast<std::size_t>(layer)] = true;
+               });
+  pillar.top_z = top;
+  return 10 * std::count(filled.begin(), filled.end(), true) >= 6 * layers;
+}
+
+/// A pillar that shows only what sticks out of a wall, as deep as it is wide.
+void complete(Pillar& pillar, const WallFace& wall, const std::vector<Vec2>& points) {
+  const Vec2 u = wall.along();
+  Vec2 n = wall.normal();
+  if ((pillar.box.centre - wall.a).dot(n) < 0) n = -n;
+  double low = std::numeric_limits<double>::infinity(), high = -low, front = -low;
+  for (const Vec2& p : points) {
+    low = std::min(low, (p - wall.a).dot(u));
+    high = std::max(high, (p - wall.a).dot(u));
+    front = std::max(front, (p - wall.a).dot(n));
+  }
+  const double width = high - low;
+  pillar.box.centre = wall.a + 0.5 * (low + high) * u + (front - 0.5 * width) * n;
+  pillar.box.length = pillar.box.width = width;
+  pillar.box.yaw_rad = std::fmod(std::atan2(u.y(), u.x()) + 2 * std::numbers::pi, std::numbers::pi);
+}
+
+void merge_twins(std::vector<Pillar>& pillars) {
+  constexpr double kTwins = 0.45;  // m: one pillar, seen from both sides of its wall
+  for (std::size_t i = 0; i < pillars.size(); ++i) {
+    for (std::size_t j = i + 1; j < pillars.size();) {
+      Pillar &a = pillars[i], &b = pillars[j];
+      if ((a.box.centre - b.box.centre).norm() > kTwins || std::abs(a.base_z - b.base_z) > 1.5) {
+        ++j;
+        continue;
+      }
+      if (a.attached && b.attached) a.box.centre = 0.5 * (a.box.centre + b.box.centre);
+      if (a.attached && !b.attached) a.box = b.box;
+      a.attached = a.attached && b.attached;
+      a.points += b.points;
+      a.top_z = std::max(a.top_z, b.top_z);
+      pillars.erase(pillars.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+}
+
+std::vector<Pillar> pillars_of(const Band& band, const std::vector<std::uint8_t>& free,
+                               const std::vector<WallFace>& walls, const WorkingCloud& cloud,
+                               const ColumnIndex& all, const Clearances& clearances,
+                               const GarageConfig& config) {
+  constexpr double kTail = 0.04;  // of the points: edges throw some off
+  constexpr double kTouch = 0.2, kProud = 0.08, kLeastProud = 0.28;  // m
+  constexpr double kBeam = 0.9, kPost = 0.3;                         // m
+  constexpr std::size_t kFewest = 12;
+  std::vector<Vec3f> rest;
+  std::vector<std::uint32_t> of_cloud;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (free[i] == 0) continue;
+    rest.push_back(band.points[i]);
+    of_cloud.push_back(band.of_cloud[i]);
+  }
+  std::vector<Pillar> pillars;
+  for (const auto& cluster : euclidean_clusters(rest, kClusterStep, static_cast<int>(kFewest))) {
+    std::vector<Vec2> points;
+    std::vector<float> floors;
+    float room = std::numeric_limits<float>::infinity();
+    for (const std::uint32_t i : cluster) {
+      points.push_back(flat(rest[i]));
+      room = std::min(room, clearances.room[of_cloud[i]]);
+      floors.push_back(rest[i].z() - clearances.above_floor[of_cloud[i]]);
+    }
+    std::nth_element(floors.begin(),
+                     floors.begin() + static_cast<std::ptrdiff_t>(floors.size() / 2), floors.end());
+    Pillar pillar;
+    pillar.base_z = static_cast<double>(floors[floors.size() / 2]);
+    pillar.points = static_cast<int>(cluster.size());
+    pillar.box = fit_rectangle(points, kTail);
+    if (pillar.box.length > config.pillar_max_m || pillar.box.length < config.pillar_min_m)
+      continue;
+    if (!reaches_down(pillar.box, all, cloud, clearances, pillar.base_z, pillar)) continue;
+    // It bears a ceiling, or is too thick for a lamp post.
+    const bool bears = pillar.top_z > pillar.base_z + static_cast<double>(room) - kBeam;
+    if (std::isfinite(room) ? !bears : pillar.box.length < kPost) continue;
+    const auto wall = std::find_if(walls.begin(), walls.end(), [&](const WallFace& w) {
+      const auto z = static_cast<double>(rest[cluster.front()].z());
+      return z > w.low - 1 && z < w.high + 1 &&
+             std::any_of(points.begin(), points.end(),
+                         [&](const Vec2& p) { return w.distance(p) < kTouch; });
+    });
+    if (wall != walls.end()) {
+      double proud = 0;
+      for (const Vec2& p : points) proud = std::max(proud, wall->distance(p));
+      if (proud < kProud || pillar.box.length < kLeastProud) continue;
+      pillar.attached = true;
+      complete(pillar, *wall, points);
+    } else if (pillar.box.width < 0.35 * pillar.box.length) {
+      // One face is all that was seen: as deep as it is wide, on the side where nothing is.
+      pillar.attached = true;
+    }
+    pillars.push_back(pillar);
+  }
+  merge_twins(pillars);
+  return pillars;
+}
+
+/// A wall's floor, by the band's points on it.
+double floor_of(const WallFace& wall, const Band& band, const ColumnIndex& index,
+                const Clearances& clearances) {
+  std::vector<float> floors;
+  const Vec2 middle = 0.5 * (wall.a + wall.b);
+  index.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
+               static_cast<float>(0.5 * wall.length() + kOnLine), [&](std::uint32_t i) {
+                 const auto z = static_cast<double>(band.points[i].z());
+                 if (wall.distance(flat(band.points[i])) > kOnLine || z < wall.low - 0.1 ||
+                     z > wall.high + 0.1) {
+                   return;
+                 }
+                 floors.push_back(band.points[i].z() - clearances.above_floor[band.of_cloud[i]]);
+               });
+  if (floors.empty()) return wall.low - kBandLow;
+  const auto mid = floors.begin() + static_cast<std::ptrdiff_t>(floors.size() / 2);
+  std::nth_element(floors.begin(), mid, floors.end());
+  return static_cast<double>(*mid);
+}
+
+/// Whether a wall goes on below the band, where a pipe or a beam does not; sets its top.
+bool stands(WallFace& wall, const WorkingCloud& cloud, const ColumnIndex& all,
+            const Clearances& clearances) {
+  constexpr double kBin = 0.25, kFrom = 1.3, kTo = 1.95, kShare = 0.35, kNear = 0.12;
+  const auto count = static_cast<std::size_t>(wall.length() / kBin) + 1;
+  std::vector<std::uint8_t> filled(count, 0);
+  float top = static_cast<float>(wall.high);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec2 p = wall.a + (static_cast<double>(k) + 0.5) * kBin * wall.along();
+    all.within(static_cast<float>(p.x()), static_cast<float>(p.y()),
+               static_cast<float>(0.5 * kBin + kNear), [&](std::uint32_t i) {
+                 const auto h = static_cast<double>(clearances.above_floor[i]);
+                 const auto z = static_cast<double>(cloud.points[i].z());
+                 if (!(std::abs(z - h - wall.base_z) < 1.0)) return;
+                 if (wall.distance(flat(cloud.points[i])) > kNear) return;
+                 if (h > kFrom && h < kTo) filled[k] = 1;
+                 if (h <= static_cast<double>(clearances.room[i])) {
+                   top = std::max(top, cloud.points[i].z());
+                 }
+               });
+  }
+  wall.high = static_cast<double>(top);
+  return static_cast<double>(std::count(filled.begin(), filled.end(), 1)) >=
+         kShare * static_cast<double>(count);
+}
+
+}  // namespace
+
+UprightStructure find_upright_structure(const WorkingCloud& cloud, const Clearances& clearances,
+                                        const GarageConfig& config) {
+  UprightStructure structure;
+  const Band band = band_of(cloud, clearances);
+  if (band.points.empty()) return structure;
+  const ColumnIndex index(band.points, cloud.low, cloud.high, WorkingCloud::kCell);
+  const ColumnIndex all(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
+  WallGrower grower(band, index);
+  for (WallFace& wall : grower.grow_all()) {
+    wall.base_z = floor_of(wall, band, index, clearances);
+    if (stands(wall, cloud, all, clearances)) structure.walls.push_back(wall);
+  }
+  structure.pillars =
+      pillars_of(band, grower.free(), structure.walls, cloud, all, clearances, config);
+  return structure;
+}
+
+}  // namespace arex

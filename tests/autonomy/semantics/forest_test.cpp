@@ -1,0 +1,269 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "autonomy/semantics/analytic_clouds.h"
+#include "config/config.h"
+#include "semantics/ground_model.h"
+#include "semantics/semantic_map.h"
+#include "semantics/working_cloud.h"
+
+namespace arex::test {
+namespace {
+
+using std::numbers::pi;
+
+const SemanticObject* stem_near(const SemanticMap& map, const Vec2& p) {
+  const SemanticObject* best = nullptr;
+  double least = 0.3;
+  for (const SemanticObject& object : map.objects) {
+    const double distance = (object.position.head<2>() - p).norm();
+    if (object.kind != SemanticClass::kTrunk || distance > least) continue;
+    least = distance;
+    best = &object;
+  }
+  return best;
+}
+
+/// Nine stems of 0.1 to 0.7 m on a slope, with shrubs around their feet and leaves above.
+struct Stand {
+  AnalyticForest cloud;
+  std::vector<AnalyticStem> stems;
+
+  Stand(const Vec2& slope, std::uint64_t seed, double seen_rad = 2 * pi) : cloud(slope, seed) {
+    cloud.add_ground(9);
+    for (int i = 0; i < 9; ++i) {
+      AnalyticStem stem;
+      stem.foot = 4.5 * Vec2(i % 3 - 1, i / 3 - 1) +
+                  Vec2(cloud.random().uniform(-1, 1), cloud.random().uniform(-1, 1));
+      stem.radius = 0.05 + 0.0375 * i;
+      stem.lean = 0.05 * Vec2(cloud.random().normal(), cloud.random().normal());
+      stem.seen_from_rad = cloud.random().uniform(0, 2 * pi);
+      stem.seen_rad = seen_rad;
+      cloud.add_stem(stem);
+      stems.push_back(stem);
+      const double reach = stem.radius + 0.6;
+      cloud.add_foliage({stem.foot.x() + reach, stem.foot.y(), 0.4}, 0.4, 150);
+      cloud.add_foliage({stem.foot.x(), stem.foot.y(), 7}, 2, 1500);
+    }
+  }
+};
+
+TEST(ForestMap, FindsEveryStemOnASlopeAndMeasuresIt) {
+  for (const double slope : {0.0, 0.3, 0.7}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const Stand stand({slope * std::cos(seed), slope * std::sin(seed)}, seed);
+      const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+      EXPECT_EQ(map.scene, SceneKind::kForest);
+      EXPECT_EQ(map.count(SemanticClass::kTrunk), stand.stems.size()) << slope << ", " << seed;
+      for (const AnalyticStem& stem : stand.stems) {
+        const SemanticObject* found = stem_near(map, stem.at_breast());
+        ASSERT_NE(found, nullptr) << "radius " << stem.radius << ", slope " << slope;
+        // Hundreds of points of 1 cm noise: millimetres; the ground under it: a few centimetres of
+        // height, a tenth of that in position.
+        EXPECT_LT((found->position.head<2>() - stem.at_breast()).norm(), 0.02);
+        EXPECT_NEAR(found->size.x(), 2 * stem.radius, 0.012 + 0.05 * stem.radius);
+        EXPECT_NEAR(found->base_z, stand.cloud.ground(stem.foot), 0.15);
+        EXPECT_GT(found->seen_fraction, 0.6);
+        if (slope == 0) {
+          EXPECT_NEAR(found->size.z(), 9, 0.6);  // the top of its leaves
+        }
+      }
+    }
+  }
+}
+
+TEST(ForestMap, MeasuresStemsOfWhichAThirdIsSeen) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Stand stand({0.1, 0.0}, seed, 2 * pi / 3);
+    const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), stand.stems.size()) << seed;
+    for (const AnalyticStem& stem : stand.stems) {
+      const SemanticObject* found = stem_near(map, stem.at_breast());
+      ASSERT_NE(found, nullptr) << "radius " << stem.radius << ", seed " << seed;
+      // An arc of 120 degrees rises by half a radius: its curvature is known a few times worse.
+      EXPECT_NEAR(found->size.x(), 2 * stem.radius, 0.035 + 0.1 * stem.radius);
+      EXPECT_LT((found->position.head<2>() - stem.at_breast()).norm(),
+                stem.radius < 0.08 ? 0.1 : 0.03 + 0.15 * stem.radius);
+      EXPECT_LT(found->seen_fraction, 0.7);
+      EXPECT_GT(found->seen_fraction, 0.15);
+    }
+  }
+}
+
+TEST(ForestMap, TakesNoFoliageForStems) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    AnalyticForest cloud({0.1, 0.1}, seed);
+    cloud.add_ground(9);
+    for (int i = 0; i < 12; ++i) {  // shrubs and crowns that hang to the ground
+      const Vec2 p(cloud.random().uniform(-7, 7), cloud.random().uniform(-7, 7));
+      cloud.add_foliage({p.x(), p.y(), 1.2}, 1.3, 1200);
+    }
+    const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), 0u) << seed;
+  }
+}
+
+TEST(ForestMap, LabelsGroundStemsAndLeaves) {
+  const Stand stand({0.2, 0.1}, 5);
+  const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+  std::size_t ground = 0, ground_right = 0, trunk = 0, trunk_right = 0, leaves = 0,
+              leaves_right = 0;
+  for (std::size_t i = 0; i < stand.cloud.points.size(); ++i) {
+    const Vec3 p = stand.cloud.points[i].cast<double>();
+    const double h = p.z() - stand.cloud.ground(p.head<2>());
+    const bool near_stem =
+        std::any_of(stand.stems.begin(), stand.stems.end(), [&](const AnalyticStem& stem) {
+          const double up = p.z() - stand.cloud.ground(stem.foot);
+          const double radius = stem.radius - stem.taper * (up - 1.3);
+          return up < stem.height &&
+                 (p.head<2>() - stem.foot - up * stem.lean).norm() < radius + 0.1;
+        });
+    const SemanticClass label = map.labels[i];
+    if (h > 5 && !near_stem) {
+      ++leaves;
+      leaves_right += label == SemanticClass::kCanopy;
+    } else if (near_stem && h > 0.4 && h < 4.5) {
+      ++trunk;
+      trunk_right += label == SemanticClass::kTrunk;
+    } else if (!near_stem && std::abs(h) < 0.03) {
+      ++ground;
+      ground_right += label == SemanticClass::kGround;
+    }
+  }
+  EXPECT_GT(static_cast<double>(ground_right), 0.97 * static_cast<double>(ground));
+  EXPECT_GT(static_cast<double>(trunk_right), 0.95 * static_cast<double>(trunk));
+  EXPECT_GT(static_cast<double>(leaves_right), 0.99 * static_cast<double>(leaves));
+}
+
+bool same(const SemanticMap& a, const SemanticMap& b) {
+  if (a.objects.size() != b.objects.size()) return false;
+  for (std::size_t i = 0; i < a.objects.size(); ++i) {
+    if (a.objects[i].position != b.objects[i].position || a.objects[i].size != b.objects[i].size) {
+      return false;
+    }
+  }
+  return a.ground.values == b.ground.values;
+}
+
+TEST(ForestMap, IsAFunctionOfTheSetOfPoints) {
+  const Stand stand({0.2, 0.1}, 6);
+  const std::vector<Vec3f>& points = stand.cloud.points;
+  const SemanticMap map = build_semantic_map(points, {}, {});
+  ASSERT_EQ(map.count(SemanticClass::kTrunk), 9u);
+  RandomStream random(1, "shuffle");
+  std::vector<std::size_t> order(points.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.bits() % i]);
+  // Shuffled, some of them twice, and numbers that are none among them.
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  std::vector<Vec3f> other;
+  std::vector<std::size_t> source;
+  for (const std::size_t i : order) {
+    other.push_back(points[i]);
+    source.push_back(i);
+    if (i % 7 == 0) {
+      other.push_back(points[i]);
+      source.push_back(i);
+    }
+    if (i % 100 == 0) {
+      other.push_back(i % 200 == 0 ? Vec3f(nan, 1, 2) : Vec3f(1, inf, 2));
+      source.push_back(points.size());
+    }
+  }
+  const SemanticMap again = build_semantic_map(other, {}, {});
+  EXPECT_TRUE(same(map, again));
+  ASSERT_EQ(again.labels.size(), other.size());
+  for (std::size_t i = 0; i < other.size(); ++i) {
+    const SemanticClass expected =
+        source[i] < points.size() ? map.labels[source[i]] : SemanticClass::kUnlabelled;
+    ASSERT_EQ(again.labels[i], expected) << i;
+  }
+}
+
+TEST(ForestMap, DoesNotDependOnTheOrigin) {
+  const Stand stand({0.2, 0.1}, 7);
+  const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+  for (const Vec3f& shift : {Vec3f(500, -300, 80), Vec3f(-0.013F, 0.021F, -60)}) {
+    std::vector<Vec3f> moved;
+    for (const Vec3f& p : stand.cloud.points) moved.push_back(p + shift);
+    const SemanticMap other = build_semantic_map(moved, {}, {});
+    ASSERT_EQ(other.objects.size(), map.objects.size());
+    for (std::size_t i = 0; i < map.objects.size(); ++i) {
+      const SemanticObject *a = &map.objects[i],
+                           *b = stem_near(other,
+                                          a->position.head<2>() + shift.head<2>().cast<double>());
+      ASSERT_NE(b, nullptr);
+      EXPECT_LT((b->position - shift.cast<double>() - a->position).norm(), 0.005);
+      EXPECT_NEAR(b->size.x(), a->size.x(), 0.005);
+    }
+  }
+}
+
+TEST(ForestMap, LivesWithNothingLittleAndFarEchoes) {
+  EXPECT_TRUE(build_semantic_map({}, {}, {}).objects.empty());
+  const std::vector<Vec3f> one{{1, 2, 3}};
+  EXPECT_TRUE(build_semantic_map(one, {}, {}).objects.empty());
+  const std::vector<Vec3f> none(500, Vec3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  EXPECT_TRUE(build_semantic_map(none, {}, {}).objects.empty());
+  const std::vector<Vec3f> same_place(500, Vec3f(1, 2, 3));
+  EXPECT_TRUE(build_semantic_map(same_place, {}, {}).objects.empty());
+  // A few points kilometres away do not hide the stand.
+  Stand stand({0, 0}, 8);
+  for (const Vec3f& far : {Vec3f(9e5F, 0, 0), Vec3f(0, -8e4F, 0), Vec3f(1e30F, 0, 0)}) {
+    stand.cloud.points.push_back(far);
+  }
+  const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+  EXPECT_EQ(map.count(SemanticClass::kTrunk), 9u);
+  EXPECT_EQ(map.labels.back(), SemanticClass::kUnlabelled);
+}
+
+TEST(ForestMap, RefusesWhatIsTooWideForAMap) {
+  RandomStream random(1, "wide");
+  std::vector<Vec3f> wide;
+  for (int i = 0; i < 5000; ++i) {
+    wide.emplace_back(static_cast<float>(random.uniform(-5e4, 5e4)),
+                      static_cast<float>(random.uniform(-5e4, 5e4)), 0.0F);
+  }
+  EXPECT_THROW(build_semantic_map(wide, {}, {}), ConfigError);
+}
+
+TEST(GroundModel, FollowsHillsUnderBushesAndIgnoresEchoesFromBelow) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    RandomStream random(seed, "hills");
+    const auto hill = [&](double x, double y) {
+      return 1.5 * std::sin(x / 4) + 1.2 * std::cos(y / 5) + 0.2 * x;
+    };
+    std::vector<Vec3f> points;
+    for (int i = 0; i < 40000; ++i) {
+      const double x = random.uniform(-15, 15), y = random.uniform(-15, 15);
+      // Half of the area is hidden by bushes of two metres that one ray in ten passes.
+      const bool bush = std::fmod(std::abs(x), 3.0) < 1.5 && random.uniform() < 0.9;
+      const double above = bush ? random.uniform(0.2, 2.0) : 0;
+      points.emplace_back(static_cast<float>(x), static_cast<float>(y),
+                          static_cast<float>(hill(x, y) + above + 0.01 * random.normal()));
+    }
+    for (int i = 0; i < 40; ++i) {
+      points.emplace_back(static_cast<float>(random.uniform(-15, 15)),
+                          static_cast<float>(random.uniform(-15, 15)),
+                          static_cast<float>(random.uniform(-12, -6)));
+    }
+    const WorkingCloud cloud(points, 0.04);
+    const Raster ground = fit_ground(cloud, 0.5);
+    std::vector<double> errors;
+    for (double x = -14; x <= 14; x += 0.7) {
+      for (double y = -14; y <= 14; y += 0.7) {
+        errors.push_back(std::abs(ground.interpolate(x, y) - hill(x, y)));
+      }
+    }
+    std::sort(errors.begin(), errors.end());
+    EXPECT_LT(errors[errors.size() / 2], 0.08) << seed;
+    EXPECT_LT(errors[errors.size() * 95 / 100], 0.3) << seed;
+    EXPECT_LT(errors.back(), 0.7) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace arex::test

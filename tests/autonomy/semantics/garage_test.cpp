@@ -1,0 +1,209 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "autonomy/semantics/analytic_clouds.h"
+#include "semantics/plan_shapes.h"
+#include "semantics/semantic_map.h"
+
+namespace arex::test {
+namespace {
+
+using std::numbers::pi;
+
+/// A hall with walls, pillars, cars and a ramp that leads up out of it, turned by a yaw. Only what
+/// can be seen from inside has points.
+class AnalyticGarage {
+ public:
+  AnalyticGarage(double yaw_rad, const Vec3& shift, std::uint64_t seed)
+      : yaw_(yaw_rad), shift_(shift), random_(seed, "analytic_garage") {}
+
+  std::vector<Vec3f> points;
+
+  [[nodiscard]] Vec3 place(const Vec3& p) const {
+    const double c = std::cos(yaw_), s = std::sin(yaw_);
+    return Vec3(c * p.x() - s * p.y(), s * p.x() + c * p.y(), p.z()) + shift_;
+  }
+  /// A parallelogram.
+  void face(const Vec3& corner, const Vec3& u, const Vec3& v) {
+    constexpr double kSpacing = 0.07, kNoise = 0.008;  // m
+    const int nu = std::max(1, static_cast<int>(u.norm() / kSpacing));
+    const int nv = std::max(1, static_cast<int>(v.norm() / kSpacing));
+    for (int i = 0; i < nu; ++i) {
+      for (int j = 0; j < nv; ++j) {
+        const Vec3 p = corner + (i + random_.uniform()) / nu * u + (j + random_.uniform()) / nv * v;
+        points.push_back((place(p) + kNoise * random_.normal3()).cast<float>());
+      }
+    }
+  }
+  /// The sides of an upright box, and its top.
+  void box(const Vec3& low, const Vec3& high, bool top) {
+    const Vec3 d = high - low, x(d.x(), 0, 0), y(0, d.y(), 0), z(0, 0, d.z());
+    face(low, x, z);
+    face(low, y, z);
+    face(low + y, x, z);
+    face(low + x, y, z);
+    if (top) face(low + z, x, y);
+  }
+
+  static constexpr double kHeight = 3.2;
+
+  void build() {
+    face({0, 0, 0}, {30, 0, 0}, {0, 18, 0});
+    face({0, 0, kHeight}, {30, 0, 0}, {0, 18, 0});
+    face({0, 0, 0}, {30, 0, 0}, {0, 0, kHeight});
+    face({0, 18, 0}, {30, 0, 0}, {0, 0, kHeight});
+    face({0, 0, 0}, {0, 18, 0}, {0, 0, kHeight});
+    face({30, 0, 0}, {0, 6, 0}, {0, 0, kHeight});
+    face({30, 11, 0}, {0, 7, 0}, {0, 0, kHeight});
+    face({30, 6, 0}, {12, 0, 2.4}, {0, 5, 0});  // the ramp, 11 degrees
+    face({30, 6, 0}, {12, 0, 2.4}, {0, 0, kHeight});
+    face({30, 11, 0}, {12, 0, 2.4}, {0, 0, kHeight});
+    for (const double x : {7.5, 15.0, 22.5}) {
+      for (const double y : {6.0, 12.0}) {
+        box({x - 0.25, y - 0.25, 0}, {x + 0.25, y + 0.25, kHeight}, false);
+        pillars.emplace_back(x, y);
+      }
+    }
+    for (int i = 0; i < 5; ++i) {  // a row of cars, 0.6 m between them
+      car({2.5 + 2.4 * i, 3.0}, pi / 2);
+    }
+    car({19, 9}, 0.15);
+  }
+  /// A body and a cabin.
+  void car(const Vec2& middle, double yaw) {
+    const AnalyticGarage own(yaw, {middle.x(), middle.y(), 0}, random_.bits());
+    AnalyticGarage body = own;
+    body.box({-2.2, -0.9, 0.2}, {2.2, 0.9, 0.9}, true);
+    body.box({-1.4, -0.75, 0.9}, {0.8, 0.75, 1.45}, true);
+    for (const Vec3f& p : body.points) points.push_back(place(p.cast<double>()).cast<float>());
+    cars.push_back(middle);
+  }
+
+  std::vector<Vec2> pillars, cars;
+
+ private:
+  double yaw_;
+  Vec3 shift_;
+  RandomStream random_;
+};
+
+std::vector<const SemanticObject*> all(const SemanticMap& map, SemanticClass kind) {
+  std::vector<const SemanticObject*> found;
+  for (const SemanticObject& object : map.objects) {
+    if (object.kind == kind) found.push_back(&object);
+  }
+  return found;
+}
+
+/// The object of a kind nearest to a place of the hall.
+const SemanticObject* nearest(const SemanticMap& map, SemanticClass kind, const Vec2& p_W) {
+  const auto found = all(map, kind);
+  const auto best = std::min_element(
+      found.begin(), found.end(), [&](const SemanticObject* a, const SemanticObject* b) {
+        return (a->position.head<2>() - p_W).norm() < (b->position.head<2>() - p_W).norm();
+      });
+  return best == found.end() ? nullptr : *best;
+}
+
+TEST(GarageMap, FindsPillarsCarsWallsAndTheRamp) {
+  for (const double yaw : {0.0, 0.4, 1.3}) {
+    AnalyticGarage garage(yaw, {12, -7, -8}, 1);
+    garage.build();
+    const SemanticMap map = build_semantic_map(garage.points, {}, {});
+    ASSERT_EQ(map.scene, SceneKind::kGarage) << map.planar_fraction;
+    EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size()) << yaw;
+    for (const Vec2& pillar : garage.pillars) {
+      const Vec2 p = garage.place({pillar.x(), pillar.y(), 0}).head<2>();
+      const SemanticObject* found = nearest(map, SemanticClass::kPillar, p);
+      ASSERT_NE(found, nullptr);
+      EXPECT_LT((found->position.head<2>() - p).norm(), 0.03) << yaw;
+      EXPECT_NEAR(found->size.x(), 0.5, 0.05);
+      EXPECT_NEAR(found->size.y(), 0.5, 0.05);
+      EXPECT_NEAR(found->base_z, -8, 0.05);
+    }
+    EXPECT_EQ(map.count(SemanticClass::kCar), garage.cars.size()) << yaw;
+    for (const Vec2& car : garage.cars) {
+      const Vec2 p = garage.place({car.x(), car.y(), 0}).head<2>();
+      const SemanticObject* found = nearest(map, SemanticClass::kCar, p);
+      ASSERT_NE(found, nullptr);
+      EXPECT_LT((found->position.head<2>() - p).norm(), 0.08) << yaw;
+      EXPECT_NEAR(found->size.x(), 4.4, 0.12);
+      EXPECT_NEAR(found->size.y(), 1.8, 0.12);
+      EXPECT_NEAR(found->size.z(), 1.45, 0.08);
+    }
+    const auto ramps = all(map, SemanticClass::kRamp);
+    ASSERT_EQ(ramps.size(), 1u) << yaw;
+    EXPECT_NEAR(ramps[0]->size.x(), 12, 0.8);
+    EXPECT_NEAR(ramps[0]->size.y(), 5, 0.6);
+    double length = 0;
+    for (const SemanticObject* wall : all(map, SemanticClass::kWall)) {
+      EXPECT_GT(wall->confidence, 0.3);
+      length += wall->size.x();
+    }
+    EXPECT_NEAR(length, 30 + 30 + 18 + 6 + 7 + 2 * 12, 6) << yaw;
+  }
+}
+
+TEST(GarageMap, LabelsItsSurfaces) {
+  AnalyticGarage garage(0, Vec3::Zero(), 2);
+  garage.build();
+  const SemanticMap map = build_semantic_map(garage.points, {}, {});
+  std::size_t floor = 0, floor_right = 0, ceiling = 0, ceiling_right = 0, wall = 0, wall_right = 0;
+  for (std::size_t i = 0; i < garage.points.size(); ++i) {
+    const Vec3f& p = garage.points[i];
+    if (p.x() < 29 && p.x() > 1 && p.y() > 1 && p.y() < 17) {
+      if (std::abs(p.z()) < 0.04F) {
+        ++floor;
+        floor_right += map.labels[i] == SemanticClass::kFloor;
+      }
+      if (std::abs(p.z() - 3.2F) < 0.04F) {
+        ++ceiling;
+        ceiling_right += map.labels[i] == SemanticClass::kCeiling;
+      }
+    }
+    if (std::abs(p.x()) < 0.03F && p.z() > 0.3F && p.z() < 2.9F) {
+      ++wall;
+      wall_right += map.labels[i] == SemanticClass::kWall;
+    }
+  }
+  EXPECT_GT(static_cast<double>(floor_right), 0.98 * static_cast<double>(floor));
+  EXPECT_GT(static_cast<double>(ceiling_right), 0.98 * static_cast<double>(ceiling));
+  EXPECT_GT(static_cast<double>(wall_right), 0.98 * static_cast<double>(wall));
+}
+
+TEST(GarageMap, ChoosesTheSceneFromTheCloudUnlessItIsNamed) {
+  AnalyticGarage garage(0.2, Vec3::Zero(), 3);
+  garage.build();
+  SemanticConfig config;
+  config.scene = SceneKind::kForest;
+  EXPECT_EQ(build_semantic_map(garage.points, {}, config).scene, SceneKind::kForest);
+  config.scene = SceneKind::kAuto;
+  EXPECT_EQ(build_semantic_map(garage.points, {}, config).scene, SceneKind::kGarage);
+}
+
+TEST(PlanShapes, FitsARectangleToThreeSides) {
+  for (const double yaw : {0.0, 0.3, 1.2, 2.5}) {
+    RandomStream random(1, "rectangle");
+    std::vector<Vec2> points;
+    const Vec2 u(std::cos(yaw), std::sin(yaw)), v(-u.y(), u.x());
+    for (int i = 0; i < 600; ++i) {
+      const double t = random.uniform(-1, 1);
+      const Vec2 noise(0.01 * random.normal(), 0.01 * random.normal());
+      const Vec2 side = i % 3 == 0   ? Vec2(2.0 * t * u + 0.9 * v)
+                        : i % 3 == 1 ? Vec2(2.0 * t * u - 0.9 * v)
+                                     : Vec2(2.0 * u + 0.9 * t * v);
+      points.push_back(Vec2(5, -3) + side + noise);
+    }
+    const Rectangle box = fit_rectangle(points, 0.005);
+    // Where the open side ends only the points of the long ones tell, 1 cm apart; three of them,
+    // the tail, are left out: 4 +- 2 cm.
+    EXPECT_LT((box.centre - Vec2(5, -3)).norm(), 0.05);
+    EXPECT_NEAR(box.length, 4, 0.1);
+    EXPECT_NEAR(box.width, 1.8, 0.06);
+    EXPECT_LT(std::abs(std::sin(box.yaw_rad - yaw)), 0.03);
+  }
+}
+
+}  // namespace
+}  // namespace arex::test

@@ -126,11 +126,15 @@ TEST(LidarInertialOdometry, FindsTheGyrosScaleAndTheImusClock) {
                {{1, 1, 1}, 50'000'000},
                {{1, 1, 1}, -50'000'000},
                {{1.03, 0.97, 1.05}, 20'000'000}};
+  // Half a minute with turns: who flies straight learns neither.
+  const Recording lively =
+      record(test::AnalyticWorld::forest(3, 24, 16),
+             {test::loop_points(24, 16, 1.5, 2, 0.5, 2), 0.5, 1.5}, 30, {}, 3, 8);
   for (const auto& [gyro_scale, clock_offset] : cases) {
-    const Recording r = with_imu(forest(), gyro_scale, clock_offset);
+    const Recording r = with_imu(lively, gyro_scale, clock_offset);
     const Flown run = fly(r);
     const NavigationState& state = run.updates.back().state;
-    EXPECT_LT(worst_error(r, run), 0.05) << gyro_scale.transpose() << ", " << clock_offset;
+    EXPECT_LT(worst_error(r, run), 0.06) << gyro_scale.transpose() << ", " << clock_offset;
     EXPECT_NEAR(state.t_d, 1e-9 * static_cast<double>(clock_offset), 1e-3);
     // About the axis that the flight turns about; it hardly rolls and pitches.
     EXPECT_NEAR((1 + state.s_g.z()) * gyro_scale.z(), 1, 0.005);

@@ -24,7 +24,7 @@ inline ImuSample imu_sample(int i) {
 /// Two packets of which the second is stamped 100 us before the first's end; every fifth firing
 /// returned.
 inline LidarScan scan_with_misses() {
-  LidarScan scan{0, kScanPeriod, {}, {1000, 381'000}};
+  LidarScan scan{"", 0, kScanPeriod, {}, {1000, 381'000}};
   for (int k = 0; k < 192; k += 5) {
     LidarPoint point;
     point.p_L = {static_cast<float>(1 + k), 2, 3};
@@ -66,10 +66,13 @@ inline Pose true_pose(int i) {
 }
 
 inline void write_samples(BagWriter& bag) {
+  bag.place_odom(Pose(), true);
   for (int i = 0; i < kImuSamples; ++i) {
     const Stamp now = i * kImuPeriod;
+    bag.begin(now);
     bag.imu(imu_sample(i));
     bag.truth(now, true_pose(i), {1.0 * i, 2.0, -0.5}, {0.5, 0.25 * i, -3});
+    bag.estimate(now, true_pose(i));
     // A scan arrives late, as from a driver: the recording is not in order of time.
     if (now % kScanPeriod == kImuPeriod && now > kScanPeriod) {
       bag.scan(lidar_scan(static_cast<int>(now / kScanPeriod) - 1));

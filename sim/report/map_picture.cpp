@@ -248,12 +248,12 @@ std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<
   for (const auto& [poses, colour, title] : paths) {
     if (poses->empty()) continue;
     const std::string name = "<title>" + escape_markup(title) + "</title>";
-    svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
-           points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
+    svg += fmt::format("<polyline class=\"run\" style=\"stroke:{}\" points=\"{}\">{}</polyline>\n",
+                       colour, points_text(*poses, kMaxOverlaidPath), name);
     const Vec3& end = poses->back().X.p;
-    ends += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:", end.x(),
-                        -end.y(), 0.6 * view.unit) +
-            colour + "\">" + name + "</circle>\n";
+    ends += fmt::format(
+        "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:{}\">{}</circle>\n", end.x(),
+        -end.y(), 0.6 * view.unit, colour, name);
   }
   const Vec3& start = paths.front().poses->front().X.p;
   svg += ends + circle(start.x(), start.y(), 0.9 * view.unit, "start", "start");

@@ -163,9 +163,8 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
       waypoint_ = 0;
       break;
     case MissionState::kReturn:
+    case MissionState::kExplore:  // hovers until the explorer's first word
       break;
-    case MissionState::kExplore:
-      break;  // hovers until the explorer's first word
     case MissionState::kFly:
       begin_flying();
       break;

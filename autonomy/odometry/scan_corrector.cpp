@@ -161,7 +161,7 @@ void ScanCorrector::start_again() {
   status_ = OdometryStatus::kInitialising;
   need_ = OdometryNeed::kReference;
   refused_in_a_row_ = doubtful_in_a_row_ = confirmations_left_ = 0;
-  gyro_.missing_radps = Vec3::Zero();
+  gyro_.missing_radps.setConstant(GyroCompletion::kUntold);
 }
 
 std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan,
@@ -172,6 +172,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   filter_.set_noise(
       shaken_by(config_.imu, white_noise(imu_.between(scan.end - kShakenFor, scan.end))));
   const ErrorStateFilter before = filter_;
+  const GyroCompletion gyro_before = gyro_;
   for (int pass = 1;; ++pass) {
     ClippedTime clipped;
     const std::vector<MotionSegment> segments = predict_to(scan.end, clipped);
@@ -181,23 +182,24 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     const std::vector<ScanPoint> downsampled = voxel_downsample(
         points, config_.registration.scan_voxel_m, config_.registration.max_points);
     update.gyro_clipped = clipped.any();
-    Vec3 missing = Vec3::Zero();
+    Vec3 missing = Vec3::Constant(GyroCompletion::kUntold);
     if (status_ == OdometryStatus::kLost) {
       update.recovered = recover(downsampled, update.registration);
     } else {
       const NavigationState predicted = filter_.state();
       update.registration = register_scan(downsampled, map_, config_, filter_);
-      missing = missing_rates(gyro_.missing_radps, clipped,
-                              local(predicted, filter_.state()).segment<3>(kRotation));
+      missing = missing_rates(clipped, local(predicted, filter_.state()).segment<3>(kRotation));
     }
     const double change = (missing - gyro_.missing_radps).norm();
-    gyro_.missing_radps = missing;
     if (!clipped.any() || change < kSettled || pass == kPasses) {
+      gyro_.missing_radps = missing;
       stamp_ = scan.end;
       imu_.forget_before(stamp_ - kShakenFor);
       return points;
     }
     filter_ = before;
+    gyro_ = gyro_before;
+    gyro_.missing_radps = missing;
   }
 }
 
@@ -207,7 +209,7 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& c
   for (ImuInterval& imu :
        imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_, filter_.state().t_d)) {
     gyro_.complete(imu);
-    clipped.add(imu);
+    clipped.add(imu, gyro_.full_scale_radps);
     segments.push_back(motion_segment(filter_.state(), imu));
     filter_.predict(imu, stood_at_.has_value());
   }

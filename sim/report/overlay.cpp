@@ -1,5 +1,7 @@
 #include "report/overlay.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,13 +10,13 @@
 
 #include "report/map_picture.h"
 #include "report/payload.h"
+#include "report/svg.h"
 
 namespace arex::sim {
 namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kColours = 6;  // --line-1 ... of the style sheet
 constexpr std::size_t kMaxRuns = 48;
 constexpr std::size_t kMaxWorlds = 6;
 constexpr std::size_t kSteps = 400;               // of a common axis
@@ -31,7 +33,7 @@ std::string world_of(const std::filesystem::path& run) {
     if (key == "seed") seed = value;
     if (!key.starts_with("world.")) continue;
     from_file = from_file || (key == "world.kind" && value == "file");
-    world += key + "=" + value + "\n";
+    world += fmt::format("{}={}\n", key, value);
   }
   return from_file ? world : world + "seed=" + seed;
 }
@@ -85,7 +87,7 @@ Overlay overlay_of(const ResultTable& results) {
   Overlay overlay;
   if (rows.size() < 2) return overlay;
   const std::vector<std::string> names =
-      rows.size() <= kColours ? titles : configuration_titles(results);
+      rows.size() <= kLineColours ? titles : configuration_titles(results);
   std::vector<std::string> groups;
   std::vector<std::vector<std::size_t>> members;
   for (const std::size_t row : rows) {
@@ -98,7 +100,7 @@ Overlay overlay_of(const ResultTable& results) {
     members[group].push_back(row);
   }
   overlay.all_groups = groups.size();
-  groups.resize(std::min(groups.size(), kColours));
+  groups.resize(std::min(groups.size(), kLineColours));
   overlay.groups = groups;
   for (std::size_t group = 0; group < groups.size(); ++group) {
     const std::size_t most = kMaxRuns / groups.size();

@@ -10,7 +10,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr std::size_t kColours = 6;
 constexpr std::size_t kMostBuckets = 400;  // of a curve: each keeps its least and its largest value
 
 // A chart's drawing, in its own units: about as wide as a phone, so that its text is read there.
@@ -95,7 +94,7 @@ std::string svg_ends(const Vec2& start, const Vec2& end, double unit) {
 }
 
 std::string svg_line_class(std::size_t n) {
-  return "line-" + std::to_string(n % kColours + 1) + (n < kColours ? "" : " again");
+  return "line-" + std::to_string(n % kLineColours + 1) + (n < kLineColours ? "" : " again");
 }
 
 std::string key_html(const std::vector<std::string>& labels) {

@@ -23,6 +23,8 @@ struct Curve {
   std::vector<double> x, y;
 };
 
+inline constexpr std::size_t kLineColours = 6;  ///< --line-1 ... of the style sheet
+
 /// The class of the nth of several lines, which gives it its colour.
 std::string svg_line_class(std::size_t n);
 

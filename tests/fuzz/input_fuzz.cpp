@@ -1,12 +1,13 @@
 // Damages what users hand to AREX - scenarios, overrides, sweeps, run folders - and reads it as the
 // commands do. Whatever comes, the answer is a result or a ConfigError of one printable line,
-// within five seconds. Case N is a pure function of N:
+// within five seconds of work. Case N is a pure function of N:
 //
 //     input_fuzz [--count N] [--first CASE] [--seconds S]
 //
 // A case that fails is named with its number and its files, which stay where they are.
 
 #include <sys/mman.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -29,7 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr unsigned kLongest_s = 5;             // for one case; sanitizers included
+constexpr unsigned kLongest_s = 5;             // of work on one case; sanitizers included
+constexpr unsigned kStuck_s = 120;             // of waiting, however busy the host is
 constexpr std::size_t kLongestMessage = 4500;  // a path may have 4096 bytes
 
 /// What the child tells its parent, who is there when it dies.
@@ -56,6 +58,13 @@ void read_case(std::uint64_t number, const Target& target, const fs::path& folde
   }
 }
 
+/// From now on. Its signals end this process, and the parent tells.
+void limit_time() {
+  const itimerval longest{{}, {kLongest_s, 0}};
+  setitimer(ITIMER_PROF, &longest, nullptr);
+  alarm(kStuck_s);
+}
+
 [[noreturn]] void work(std::uint64_t end, double seconds, const fs::path& folder,
                        Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
@@ -66,7 +75,7 @@ void read_case(std::uint64_t number, const Target& target, const fs::path& folde
     const Target& target = targets[progress.next % targets.size()];
     fs::remove_all(folder);
     fs::create_directories(folder);
-    alarm(kLongest_s);  // its signal ends this process, and the parent tells
+    limit_time();
     try {
       read_case(progress.next, target, folder, progress);
     } catch (const std::exception& error) {
@@ -119,8 +128,10 @@ int fuzz(const Options& options) {
   const fs::path kept = fs::temp_directory_path() / ("arex-fuzz-" + std::to_string(progress->next));
   fs::remove_all(kept);
   fs::copy(inputs, kept, fs::copy_options::recursive);
-  const bool hung = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
-  const std::string end = hung ? "took longer than " + std::to_string(kLongest_s) + " s"
+  const bool slow = WIFSIGNALED(status) && WTERMSIG(status) == SIGPROF;
+  const bool stuck = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
+  const std::string end = stuck  ? "hung"
+                          : slow ? "took longer than " + std::to_string(kLongest_s) + " s"
                           : WIFSIGNALED(status)
                               ? "died of signal " + std::to_string(WTERMSIG(status))
                               : "failed";

@@ -13,6 +13,9 @@ constexpr double kSameReading = 1e-4;    // rad/s, far below the noise of a samp
 constexpr int kRepeats = 3;
 constexpr double kShortest = 0.02;   // s of clipping that tell a rate
 constexpr double kMostMissing = 20;  // rad/s
+// An acceleration is averaged over so long, and lasts so long: drives turn a vehicle to a new rate
+// within a tenth of a second or two.
+constexpr double kSlopeTime = 0.04, kLasting = 0.12;  // s
 
 }  // namespace
 
@@ -20,14 +23,27 @@ bool GyroCompletion::clipped(double reading_radps) const {
   return std::abs(reading_radps) >= kAtFullScale * full_scale_radps;
 }
 
-void GyroCompletion::complete(ImuInterval& imu) const {
-  for (Vec3* gyro : {&imu.gyro_begin, &imu.gyro_end}) {
-    for (int i = 0; i < 3; ++i) {
-      double& reading = (*gyro)[i];
-      if (!clipped(reading)) continue;
-      reading += std::copysign(missing_radps[i], reading);
-      imu.gyro_clipped[static_cast<std::size_t>(i)] = true;
+double GyroCompletion::missing(int axis, double side) const {
+  if (missing_radps[axis] >= 0) return missing_radps[axis];
+  const double gain = kLasting * (1 - std::exp(-clipped_s_[axis] / kLasting));
+  return std::clamp(side * acceleration_radps2_[axis] * gain, 0.0, kMostMissing);
+}
+
+void GyroCompletion::complete(ImuInterval& imu) {
+  const double dt = imu.dt_s();
+  for (int i = 0; i < 3; ++i) {
+    double &begin = imu.gyro_begin[i], &end = imu.gyro_end[i];
+    const bool begin_clipped = clipped(begin), end_clipped = clipped(end);
+    if (!begin_clipped && !end_clipped) {
+      const double share = dt / (dt + kSlopeTime);
+      if (dt > 0) acceleration_radps2_[i] += share * ((end - begin) / dt - acceleration_radps2_[i]);
+      clipped_s_[i] = 0;
+      continue;
     }
+    imu.gyro_clipped[static_cast<std::size_t>(i)] = true;
+    if (begin_clipped) begin += std::copysign(missing(i, std::copysign(1.0, begin)), begin);
+    clipped_s_[i] += dt;
+    if (end_clipped) end += std::copysign(missing(i, std::copysign(1.0, end)), end);
   }
 }
 
@@ -43,20 +59,24 @@ void GyroFullScale::add(const Vec3& gyro_radps) {
   last_ = gyro_radps;
 }
 
-void ClippedTime::add(const ImuInterval& imu) {
+void ClippedTime::add(const ImuInterval& imu, double full_scale_radps) {
   for (int i = 0; i < 3; ++i) {
     if (!imu.gyro_clipped[static_cast<std::size_t>(i)]) continue;
     seconds[i] += imu.dt_s();
     side[i] = std::copysign(1.0, imu.gyro_end[i]);
+    for (const double reading : {imu.gyro_begin[i], imu.gyro_end[i]}) {
+      added_rad[i] += 0.5 * imu.dt_s() * std::max(0.0, std::abs(reading) - full_scale_radps);
+    }
   }
 }
 
-Vec3 missing_rates(const Vec3& missing_radps, const ClippedTime& clipped, const Vec3& turn_rad) {
-  Vec3 missing = Vec3::Zero();
+Vec3 missing_rates(const ClippedTime& clipped, const Vec3& turn_rad) {
+  Vec3 missing = Vec3::Constant(GyroCompletion::kUntold);
   for (int i = 0; i < 3; ++i) {
     if (clipped.seconds[i] < kShortest) continue;
-    const double lacking = 2 * clipped.side[i] * turn_rad[i] / clipped.seconds[i];
-    missing[i] = std::clamp(missing_radps[i] + lacking, 0.0, kMostMissing);
+    const double lacking_rad = 2 * clipped.side[i] * turn_rad[i];
+    missing[i] =
+        std::clamp((clipped.added_rad[i] + lacking_rad) / clipped.seconds[i], 0.0, kMostMissing);
   }
   return missing;
 }

@@ -6,17 +6,27 @@
 #include "odometry/inertial/navigation_state.h"
 
 /// A gyro that turns faster than its full scale reads the full scale. The odometry notices it by
-/// the readings alone and lets the scans say what they lack.
+/// the readings alone and lets the scans say what they lack; until one does, the turn is taken to
+/// go on as it came.
 namespace arex {
 
-/// What a reading at full scale lacks.
+/// What readings at full scale lack. Goes along with the intervals, one after the other.
 struct GyroCompletion {
+  static constexpr double kUntold = -1;
+
   double full_scale_radps = 0;
-  Vec3 missing_radps = Vec3::Zero();  ///< beyond the full scale, each axis, >= 0
+  /// Beyond the full scale, each axis, by the newest scan; kUntold where none has told.
+  Vec3 missing_radps = Vec3::Constant(kUntold);
 
   [[nodiscard]] bool clipped(double reading_radps) const;
   /// Marks the axes at full scale and adds what their readings lack.
-  void complete(ImuInterval& imu) const;
+  void complete(ImuInterval& imu);
+
+ private:
+  [[nodiscard]] double missing(int axis, double side) const;
+
+  Vec3 acceleration_radps2_ = Vec3::Zero();  ///< of the last sound readings
+  Vec3 clipped_s_ = Vec3::Zero();            ///< since then
 };
 
 /// Learns the full scale: a clipped axis repeats its reading, which noise keeps a sound one from.
@@ -37,10 +47,11 @@ class GyroFullScale {
 /// For how long each axis was clipped during a scan, and to which side.
 struct ClippedTime {
   Vec3 seconds = Vec3::Zero();
-  Vec3 side = Vec3::Zero();  ///< sign of the readings
+  Vec3 side = Vec3::Zero();       ///< sign of the readings
+  Vec3 added_rad = Vec3::Zero();  ///< what the completion added to the turn, to that side
 
   /// @param imu a completed interval
-  void add(const ImuInterval& imu);
+  void add(const ImuInterval& imu, double full_scale_radps);
   [[nodiscard]] bool any() const { return seconds.maxCoeff() > 0; }
 };
 
@@ -48,7 +59,7 @@ struct ClippedTime {
 /// a rate that lacks d shows half of the turn that is missing at its end: its points lack nothing
 /// at its begin.
 /// @param turn_rad correction of the attitude by the scan, in B
-/// @return the missing rates, axis by axis; zero where nothing was clipped.
-Vec3 missing_rates(const Vec3& missing_radps, const ClippedTime& clipped, const Vec3& turn_rad);
+/// @return the missing rates, axis by axis; kUntold where nothing was clipped for long enough.
+Vec3 missing_rates(const ClippedTime& clipped, const Vec3& turn_rad);
 
 }  // namespace arex

@@ -32,7 +32,10 @@ void ImuPredictor::anchor(Stamp stamp, const NavigationState& state, double acce
 
 std::optional<NavigationState> ImuPredictor::at(Stamp stamp) const {
   if (!head_ || samples_.empty() || stamp <= head_stamp_) return head_;
-  return integrate(stamp);
+  NavigationState state = *head_;
+  GyroCompletion completion = completion_;
+  integrate(stamp, state, completion);
+  return state;
 }
 
 void ImuPredictor::advance() {
@@ -47,17 +50,15 @@ void ImuPredictor::advance() {
   if (after == samples_.begin()) return;
   const Stamp to = (after - 1)->stamp - delay;
   if (to <= head_stamp_) return;
-  head_ = integrate(to);
+  integrate(to, *head_, completion_);
   head_stamp_ = to;
 }
 
-NavigationState ImuPredictor::integrate(Stamp to) const {
-  NavigationState state = *head_;
-  for (ImuInterval& imu : imu_intervals(samples_, head_stamp_, to, accel_scale_, head_->t_d)) {
-    completion_.complete(imu);
+void ImuPredictor::integrate(Stamp to, NavigationState& state, GyroCompletion& completion) const {
+  for (ImuInterval& imu : imu_intervals(samples_, head_stamp_, to, accel_scale_, state.t_d)) {
+    completion.complete(imu);
     state = propagate(state, imu);
   }
-  return state;
 }
 
 }  // namespace arex

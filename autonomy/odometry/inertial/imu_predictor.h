@@ -29,7 +29,7 @@ class ImuPredictor {
 
  private:
   void advance();
-  [[nodiscard]] NavigationState integrate(Stamp to) const;
+  void integrate(Stamp to, NavigationState& state, GyroCompletion& completion) const;
 
   std::vector<ImuSample> samples_;  ///< from one at or before the anchor on
   std::optional<NavigationState> head_;

@@ -427,6 +427,45 @@ TEST(LidarInertialOdometry, CarriesOnAndSaysSoWhileTheGyroIsClipped) {
   }
 }
 
+// A ramp to a rate beyond full scale, as a drive turns a vehicle: until a scan tells, what is
+// missing is no further off than half of what an unfinished reading would lack.
+TEST(GyroCompletion, TakesTheTurnToGoOnAsItCame) {
+  constexpr double kFullScale = 2.5, kAcceleration = 8, kMost = 3.5;
+  for (const double side : {1.0, -1.0}) {
+    const auto rate = [&](int k) { return side * std::min(kMost, 5e-3 * k * kAcceleration); };
+    GyroCompletion completion;
+    completion.full_scale_radps = kFullScale;
+    double missed_rad = 0, read_rad = 0;
+    for (int k = 0; k < 120; ++k) {
+      ImuInterval imu;
+      imu.gyro_begin = imu.gyro_end = Vec3::Zero();
+      imu.begin = k * kPeriod;
+      imu.end = (k + 1) * kPeriod;
+      imu.gyro_begin.z() = std::clamp(rate(k), -kFullScale, kFullScale);
+      imu.gyro_end.z() = std::clamp(rate(k + 1), -kFullScale, kFullScale);
+      const double truth = 0.5 * (rate(k) + rate(k + 1));
+      read_rad += 5e-3 * std::abs(truth - imu.mean_gyro().z());
+      completion.complete(imu);
+      EXPECT_EQ(imu.gyro_clipped[2], std::abs(rate(k + 1)) >= kFullScale);
+      missed_rad += 5e-3 * std::abs(truth - imu.mean_gyro().z());
+      EXPECT_EQ(imu.gyro_begin.x(), 0);
+    }
+    EXPECT_LT(missed_rad, 0.33 * read_rad);
+  }
+}
+
+TEST(GyroCompletion, ASteadyReadingAtFullScaleLacksNothing) {
+  GyroCompletion completion;
+  completion.full_scale_radps = 2.5;
+  ImuInterval imu;
+  imu.gyro_begin = imu.gyro_end = Vec3::Zero();
+  imu.end = kPeriod;
+  imu.gyro_begin.z() = imu.gyro_end.z() = 2.5;
+  completion.complete(imu);
+  EXPECT_TRUE(imu.gyro_clipped[2]);
+  EXPECT_EQ(imu.mean_gyro().z(), 2.5);
+}
+
 TEST(GyroFullScale, IsLearnedFromRepeatedReadingsOnly) {
   GyroFullScale scale(34.9);
   RandomStream random(1, "gyro");

@@ -13,6 +13,7 @@ void RevenueExplorer::choose(Decision& decision, const ExplorationSpace& space,
     decision.source = kNames[static_cast<std::size_t>(source)];
     decision.candidates = assess(source, space, input);
     if (any_worthwhile(decision.candidates)) return select(decision);
+    if (!config().stop.exhaustive) return;
   }
 }
 

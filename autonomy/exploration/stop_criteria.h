@@ -20,6 +20,7 @@ inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_ca
 
 struct StopConfig {
   double min_area_m2 = 0.3;
+  bool exhaustive = true;
   double reserve_fraction = 0.2;       ///< 80 % discharge (models/arex/README.md)
   double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
   bool return_home = true;             ///< handed down from mission.land_at_start
@@ -31,6 +32,9 @@ struct StopConfig {
 
   void fields(auto& f) {
     f("min_area_m2", min_area_m2, "stop when no candidate has more unknown area than this");
+    f("exhaustive", exhaustive,
+      "before it ends for want of candidates: search the whole map for frontiers, and fly back to "
+      "what cannot be reached any more; false: the trees' word ends it (paper)");
     f("reserve_fraction", reserve_fraction, "of the battery's energy, not to be touched");
     f("return_speed_fraction", return_speed_fraction,
       "mean speed on the way home, part of planning.local.max_speed_mps");

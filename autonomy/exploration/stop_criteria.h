@@ -23,7 +23,7 @@ struct StopConfig {
   bool exhaustive = true;
   double reserve_fraction = 0.2;       ///< 80 % discharge (models/arex/README.md)
   double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
-  bool return_home = true;             ///< handed down from mission.land_at_start
+  bool return_home = true;             ///< handed down from mission.land_at_start, where it is true
   double return_speed_mps = 1.0;  ///< handed down: the fraction of planning.local's speed limit
   double landing_s = 20;
   double landing_clearance_m = 1.0;  ///< the vehicle's 0.3 m and a drift of twice that
@@ -59,8 +59,10 @@ struct EnergyBalance {
   double left_wh = 0;     ///< believed to be in the battery
   double needed_wh = 0;   ///< way home and landing, with the margin
   double reserve_wh = 0;  ///< to be left after landing
+  double home_wh = 0;     ///< way home and landing, with the margin, whether it lands there or not
 
   [[nodiscard]] bool must_stop() const { return left_wh - reserve_wh <= needed_wh; }
+  [[nodiscard]] bool reaches_home() const { return left_wh - reserve_wh > home_wh; }
   /// Whether even without the reserve it would not get home: land instead.
   [[nodiscard]] bool out_of_reach() const { return left_wh < needed_wh; }
 };

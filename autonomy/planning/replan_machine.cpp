@@ -108,6 +108,13 @@ void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stam
   if (state_ == ReplanState::kExecTraj && !current_.recovery) enter(ReplanState::kReplanTraj, now);
 }
 
+void ReplanMachine::drop_target(Stamp now) {
+  target_.reset();
+  guide_.clear();
+  cause_ = StuckCause::kNone;
+  if (state_ == ReplanState::kGenNewTraj) enter(ReplanState::kWaitTarget, now);
+}
+
 std::vector<PlannerEvent> ReplanMachine::take_events() { return std::exchange(events_, {}); }
 
 void ReplanMachine::enter(ReplanState state, Stamp now) {

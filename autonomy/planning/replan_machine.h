@@ -134,6 +134,8 @@ class ReplanMachine {
     guide_ = std::move(guide);
     new_guide_ = true;
   }
+  /// Takes the target away: it comes to rest where there is room.
+  void drop_target(Stamp now);
   /// Gives the target up: another one is needed.
   void give_up(StuckCause cause, Stamp now);
   /// Gives it up where the vehicle gets no nearer to it. tick() asks this, too.

@@ -70,7 +70,8 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       previous_truth_(physics_.truth()),
       scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
               ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
-      jobs_(threads) {
+      jobs_(threads),
+      operator_(config_.operator_link, config_.commands, config_.seed) {
   add_devices();
   stack_ = std::make_unique<Stack>(config_.stack, jobs_, config_.seed);
   outlets_.software = stack_.get();
@@ -129,6 +130,7 @@ void Simulation::run_stack() {
                            autopilot_.armed(), autopilot_.state() > AutopilotState::kSpinUp,
                            autopilot_.landed()});
   }
+  for (const OperatorMessage& message : operator_.deliver(now_)) stack_->add_operator(message);
   const auto command = stack_->tick();
   if (!command) return;
   autopilot_.command(*command);
@@ -163,6 +165,7 @@ void Simulation::record() {
       scorer_.target_reached(truth, view);
       exploration_.reached += view.state == MissionState::kExplore;
     }
+    operator_.report(event);
     if (recorder_) recorder_->event(event);
   }
   if (now_ % FlightScorer::kPeriod == 0) {

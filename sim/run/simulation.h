@@ -144,6 +144,7 @@ class Simulation {
   Outlets outlets_;
   std::vector<std::pair<std::string, std::unique_ptr<Device>>> devices_;  ///< fired in this order
   std::unique_ptr<FlightSoftware> stack_;
+  OperatorLink operator_;
 };
 
 }  // namespace arex::sim

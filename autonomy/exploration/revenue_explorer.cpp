@@ -42,6 +42,7 @@ std::vector<Candidate> RevenueExplorer::assess(Source source, const ExplorationS
 
 void RevenueExplorer::select(Decision& decision) {
   if (config().revenue.direction_aware) {
+    decision.undirected_winner = best_undirected(decision.candidates);
     apply_direction_filter(decision.candidates, config().filter);
   }
   decision.winner = best_candidate(decision.candidates);

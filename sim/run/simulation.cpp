@@ -39,6 +39,7 @@ void ExplorationLog::add(const Decision& decision) {
               decision.previous_end == TargetEnd::kCutOff;
   if (decision.kind == DecisionKind::kNewTarget) {
     ++issued;
+    directed += decision.undirected_winner && decision.undirected_winner != decision.winner;
     exhaustive += decision.source == "exhaustive" || decision.source == "forgiving";
   } else if (decision.kind == DecisionKind::kStop) {
     stop_reason = decision.stop_reason;
@@ -55,6 +56,7 @@ void ExplorationLog::add_figures(Figures& figures) const {
   figures.set("exploration.targets_reached", reached);
   figures.set("exploration.targets_given_up", given_up);
   figures.set("exploration.exhaustive", exhaustive);
+  figures.set("exploration.directed", directed);
   if (stop_reason != StopReason::kNone) {
     figures.set("exploration.stop", kStopReasonNames[static_cast<std::size_t>(stop_reason)]);
   }

@@ -321,8 +321,8 @@ class FormClasses {
  public:
   FormClasses(World& world, const Vec3& start) : world_(world) {
     const double volume = (world.bounds.high - world.bounds.low).prod();
-    constexpr double kMostCells = 4e7;
-    const double resolution = std::max(0.2, std::cbrt(volume / kMostCells));
+    constexpr double kMostProbed = 4e7;
+    const double resolution = std::max(0.2, std::cbrt(volume / kMostProbed));
     OccupancyGrid occupancy = voxelize(world, make_grid(world.bounds, resolution),
                                        ClassSet::all().without(SurfaceClass::kLeaf));
     air_.grid = occupancy.grid;

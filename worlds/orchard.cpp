@@ -45,7 +45,8 @@ void add_trellis(MeshBuilder& builder, const OrchardRecipe& recipe, double y,
 }  // namespace
 
 int OrchardRecipe::rows() const {
-  return 2 * std::max(1, static_cast<int>((size_m.y() / 2 - headland_m) / row_spacing_m + 0.5));
+  const long half = std::lround((size_m.y() / 2 - headland_m) / row_spacing_m);
+  return 2 * std::max(1, static_cast<int>(half));
 }
 
 double OrchardRecipe::row_y_m(int row) const { return (row - (rows() - 1) / 2.0) * row_spacing_m; }

@@ -36,6 +36,8 @@ target_compile_options(arex_options INTERFACE
   # GCC 12 sees phantom overruns, overlaps and uninitialised reads in Eigen's vectorised assignments
   # and where a string is put behind a char pointer.
   -Wno-array-bounds -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-restrict
+  # In a batch, sources are included, and GCC takes their anonymous namespaces for a header's.
+  $<$<BOOL:${AREX_UNITY}>:-Wno-subobject-linkage>
   $<$<BOOL:${AREX_WERROR}>:-Werror>)
 if(AREX_SANITIZE)
   target_compile_options(arex_options INTERFACE

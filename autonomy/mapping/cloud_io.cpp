@@ -17,7 +17,9 @@ void write_pcd(const std::filesystem::path& file, std::span<const Vec3f> points)
   const std::size_t header = bytes.size();
   static_assert(sizeof(Vec3f) == 3 * sizeof(float));
   bytes.resize(header + points.size_bytes());
-  if (!points.empty()) std::memcpy(bytes.data() + header, points.data(), points.size_bytes());
+  if (!points.empty()) {
+    std::memcpy(bytes.data() + header, points.front().data(), points.size_bytes());
+  }
   write_atomically(file, bytes, false);
 }
 

@@ -171,9 +171,8 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
       request_ = {MotionRequest::Kind::kHold, request_.goal_O, 0, ++orders_};
       break;
     case MissionState::kReturn:
+    case MissionState::kExplore:  // hovers until the explorer's first word
       break;
-    case MissionState::kExplore:
-      break;  // hovers until the explorer's first word
     case MissionState::kFly:
       begin_flying();
       break;

@@ -82,8 +82,8 @@ std::vector<Door> find_doors(const WorkingCloud& cloud, const Clearances& cleara
   std::vector<Door> doors;
   for (const WallFace& wall : structure.walls) {
     const std::vector<Slice> slices = slices_of(wall, cloud, index, clearances);
-    std::vector<Look> looks;
-    for (const Slice& slice : slices) looks.push_back(look_of(slice));
+    std::vector<Look> looks(slices.size());
+    std::transform(slices.begin(), slices.end(), looks.begin(), look_of);
     for (std::size_t first = 0, last = 0; first < looks.size(); first = last) {
       for (last = first + 1; last < looks.size() && looks[last] == looks[first]; ++last) {
       }

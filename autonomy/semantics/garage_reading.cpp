@@ -14,6 +14,19 @@ namespace {
 constexpr double kOnSurface = 0.12;  // m, roughness and noise of a floor's or ceiling's points
 constexpr double kOnFace = 0.1;      // m, likewise of a wall's
 
+/// @param size along its own axes and upwards, from base_z on
+SemanticObject object_of(SemanticClass kind, const Vec2& centre, double base_z, const Vec3& size,
+                         double yaw_rad, double confidence) {
+  SemanticObject object;
+  object.kind = kind;
+  object.position = {centre.x(), centre.y(), base_z + 0.5 * size.z()};
+  object.size = size;
+  object.yaw_rad = yaw_rad;
+  object.base_z = base_z;
+  object.confidence = confidence;
+  return object;
+}
+
 /// The lowest floor of each cell, its neighbours' where there is none.
 Raster ground_of(const WorkingCloud& cloud, const std::vector<LevelSurface>& surfaces) {
   Raster ground(cloud.low.head<2>().cast<double>(), cloud.high.head<2>().cast<double>(),
@@ -140,15 +153,10 @@ class RampFinder {
       const Rectangle box = fit_rectangle(plan, 0.02);
       if (box.width < kLeastSide || high - low < 0.5F) continue;
       for (const std::size_t cell : cells) mask[cell] = 1;
-      SemanticObject ramp;
-      ramp.kind = SemanticClass::kRamp;
-      ramp.position = {box.centre.x(), box.centre.y(), 0.5 * static_cast<double>(low + high)};
-      ramp.size = {box.length + slopes.cell_m, box.width + slopes.cell_m,
-                   static_cast<double>(high - low)};
-      ramp.yaw_rad = box.yaw_rad;
-      ramp.base_z = static_cast<double>(low);
-      ramp.confidence = std::min(1.0, area / (0.8 * box.length * box.width));
-      ramps_.push_back(ramp);
+      const double base = static_cast<double>(low), height = static_cast<double>(high - low);
+      const Vec3 size(box.length + slopes.cell_m, box.width + slopes.cell_m, height);
+      ramps_.push_back(object_of(SemanticClass::kRamp, box.centre, base, size, box.yaw_rad,
+                                 std::min(1.0, area / (0.8 * box.length * box.width))));
     }
     return mask;
   }
@@ -163,46 +171,25 @@ double saturating(int points, double usual) { return 1 - std::exp(-points / usua
 void add_objects(const UprightStructure& structure, const std::vector<ParkedCar>& cars,
                  const std::vector<Door>& doors, std::vector<SemanticObject>& objects) {
   for (const WallFace& wall : structure.walls) {
-    SemanticObject object;
-    object.kind = SemanticClass::kWall;
-    const Vec2 middle = 0.5 * (wall.a + wall.b);
-    object.position = {middle.x(), middle.y(), 0.5 * (wall.base_z + wall.high)};
-    object.size = {wall.length(), 0, wall.high - wall.base_z};
-    object.yaw_rad = std::atan2(wall.along().y(), wall.along().x());
-    object.base_z = wall.base_z;
-    object.confidence = saturating(wall.points, 40 * wall.length());
-    objects.push_back(object);
+    const double yaw = std::atan2(wall.along().y(), wall.along().x());
+    objects.push_back(object_of(SemanticClass::kWall, 0.5 * (wall.a + wall.b), wall.base_z,
+                                {wall.length(), 0, wall.high - wall.base_z}, yaw,
+                                saturating(wall.points, 40 * wall.length())));
   }
   for (const Pillar& pillar : structure.pillars) {
-    SemanticObject object;
-    object.kind = SemanticClass::kPillar;
-    object.position = {pillar.box.centre.x(), pillar.box.centre.y(),
-                       0.5 * (pillar.base_z + pillar.top_z)};
-    object.size = {pillar.box.length, pillar.box.width, pillar.top_z - pillar.base_z};
-    object.yaw_rad = pillar.box.yaw_rad;
-    object.base_z = pillar.base_z;
-    object.confidence = saturating(pillar.points, 60) * (pillar.attached ? 0.7 : 1);
-    objects.push_back(object);
+    const Rectangle& box = pillar.box;
+    objects.push_back(object_of(SemanticClass::kPillar, box.centre, pillar.base_z,
+                                {box.length, box.width, pillar.top_z - pillar.base_z}, box.yaw_rad,
+                                saturating(pillar.points, 60) * (pillar.attached ? 0.7 : 1)));
   }
   for (const ParkedCar& car : cars) {
-    SemanticObject object;
-    object.kind = SemanticClass::kCar;
-    object.position = {car.box.centre.x(), car.box.centre.y(), car.base_z + 0.5 * car.height};
-    object.size = {car.box.length, car.box.width, car.height};
-    object.yaw_rad = car.box.yaw_rad;
-    object.base_z = car.base_z;
-    object.confidence = saturating(car.points, 150) * (car.whole ? 1 : 0.7);
-    objects.push_back(object);
+    objects.push_back(object_of(SemanticClass::kCar, car.box.centre, car.base_z,
+                                {car.box.length, car.box.width, car.height}, car.box.yaw_rad,
+                                saturating(car.points, 150) * (car.whole ? 1 : 0.7)));
   }
   for (const Door& door : doors) {
-    SemanticObject object;
-    object.kind = SemanticClass::kDoor;
-    object.position = {door.centre.x(), door.centre.y(), door.base_z + 0.5 * door.height};
-    object.size = {door.width, 0, door.height};
-    object.yaw_rad = door.yaw_rad;
-    object.base_z = door.base_z;
-    object.confidence = door.open ? 0.6 : 0.5;
-    objects.push_back(object);
+    objects.push_back(object_of(SemanticClass::kDoor, door.centre, door.base_z,
+                                {door.width, 0, door.height}, door.yaw_rad, door.open ? 0.6 : 0.5));
   }
 }
 

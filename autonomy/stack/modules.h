@@ -51,9 +51,11 @@ inline constexpr std::string_view kPluginAbi = "arex 1, g++ " __VERSION__;
 
 }  // namespace arex
 
-/// Begins the function that a plug-in registers its modules in.
+/// Begins the function that a plug-in registers its modules in. `modules` names a parameter, which
+/// no parentheses may enclose.
 #define AREX_PLUGIN(modules)                                                             \
   extern "C" const char* arex_plugin_abi() { return arex::kPluginAbi.data(); }           \
   static void arex_register_modules(arex::Modules&);                                     \
   extern "C" void arex_plugin_register(arex::Modules& to) { arex_register_modules(to); } \
+  /* NOLINTNEXTLINE(bugprone-macro-parentheses) */                                       \
   static void arex_register_modules(arex::Modules& modules)

@@ -315,7 +315,7 @@ bool MeshContacts::is_nearest(const Vec3& on_skeleton, const Vec3& on_face, doub
 }
 
 // Two triangles that share the place, or the rim's deepest point beside a point of the polygon.
-void MeshContacts::add(MeshTouch touch) {
+void MeshContacts::add(const MeshTouch& touch) {
   for (std::size_t i = first_of_shape_; i < touches_.size(); ++i) {
     MeshTouch& other = touches_[i];
     if ((other.p_W - touch.p_W).norm() < kOneContact &&

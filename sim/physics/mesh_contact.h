@@ -85,7 +85,7 @@ class MeshContacts {
   void touch_corners(std::uint32_t shape, const Pose& X_WB);
   [[nodiscard]] bool is_nearest(const Vec3& on_skeleton, const Vec3& on_face,
                                 double distance) const;
-  void add(MeshTouch touch);
+  void add(const MeshTouch& touch);
   void keep_deepest();
 
   const worlds::World& world_;

@@ -265,8 +265,12 @@ PictureRenderer::PictureRenderer(const worlds::World& world) : impl_(std::make_u
 }
 
 PictureRenderer::~PictureRenderer() {
-  const EglContext::Current current(impl_->context);
-  impl_->device.reset();
+  try {
+    const EglContext::Current current(impl_->context);
+    impl_->device.reset();
+  } catch (const std::exception&) {
+    // The context is lost, and what lay in it with it.
+  }
 }
 
 void PictureRenderer::Impl::draw_world(const Pose& X_WC, const PictureOptions& options,

@@ -237,6 +237,7 @@ ordered_json comparison_payload(const ResultTable& results,
     if (whole || is_key || is_main) columns.push_back(i);
   }
   std::vector<std::string> names;
+  names.reserve(columns.size());
   for (const std::size_t column : columns) names.push_back(table.columns[column]);
   ordered_json rows = ordered_json::array();
   ordered_json links = ordered_json::array();

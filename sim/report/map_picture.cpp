@@ -1,13 +1,11 @@
 #include "report/map_picture.h"
 
 #include <fmt/format.h>
-#include <png.h>
 
 #include <array>
 #include <cmath>
-#include <cstring>
-#include <stdexcept>
 
+#include "files/png.h"
 #include "report/payload.h"
 #include "report/svg.h"
 #include "report/targets.h"
@@ -36,25 +34,9 @@ constexpr std::array<std::array<std::uint8_t, 4>, 4> kPalette = {
 constexpr std::uint8_t kUnknown = 0, kFree = 1, kSparse = 2, kOccupied = 3;
 
 std::string png_data_uri(const Backdrop& backdrop) {
-  png_image image;
-  std::memset(&image, 0, sizeof(image));
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(backdrop.width);
-  image.height = static_cast<png_uint_32>(backdrop.height);
-  image.format = PNG_FORMAT_RGBA_COLORMAP;
-  image.colormap_entries = kPalette.size();
-  png_alloc_size_t size = 0;
-  const auto write = [&](void* memory) {
-    if (png_image_write_to_memory(&image, memory, &size, 0, backdrop.indices.data(), 0,
-                                  kPalette.data()) == 0) {
-      throw std::runtime_error(std::string("PNG of the 2D map: ") + image.message);
-    }
-  };
-  write(nullptr);
-  std::vector<std::uint8_t> bytes(size);
-  write(bytes.data());
-  bytes.resize(size);
-  return "data:image/png;base64," + base64(bytes);
+  const std::string png = png_bytes(backdrop.width, backdrop.height, backdrop.indices, kPalette);
+  return "data:image/png;base64," +
+         base64({reinterpret_cast<const std::uint8_t*>(png.data()), png.size()});
 }
 
 // The known part of the map.
@@ -248,12 +230,12 @@ std::string overlaid_paths_svg(const RunRecord& backdrop_run, const std::vector<
   for (const auto& [poses, colour, title] : paths) {
     if (poses->empty()) continue;
     const std::string name = "<title>" + escape_markup(title) + "</title>";
-    svg += "<polyline class=\"run\" style=\"stroke:" + colour + "\" points=\"" +
-           points_text(*poses, kMaxOverlaidPath) + "\">" + name + "</polyline>\n";
+    svg += fmt::format("<polyline class=\"run\" style=\"stroke:{}\" points=\"{}\">{}</polyline>\n",
+                       colour, points_text(*poses, kMaxOverlaidPath), name);
     const Vec3& end = poses->back().X.p;
-    ends += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:", end.x(),
-                        -end.y(), 0.6 * view.unit) +
-            colour + "\">" + name + "</circle>\n";
+    ends += fmt::format(
+        "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" style=\"fill:{}\">{}</circle>\n", end.x(),
+        -end.y(), 0.6 * view.unit, colour, name);
   }
   const Vec3& start = paths.front().poses->front().X.p;
   svg += ends + circle(start.x(), start.y(), 0.9 * view.unit, "start", "start");

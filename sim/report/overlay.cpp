@@ -1,5 +1,7 @@
 #include "report/overlay.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,7 +33,7 @@ std::string world_of(const std::filesystem::path& run) {
     if (key == "seed") seed = value;
     if (!key.starts_with("world.")) continue;
     from_file = from_file || (key == "world.kind" && value == "file");
-    world += key + "=" + value + "\n";
+    world += fmt::format("{}={}\n", key, value);
   }
   return from_file ? world : world + "seed=" + seed;
 }

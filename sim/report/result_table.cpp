@@ -154,6 +154,7 @@ std::vector<std::string> names_of(const std::vector<std::string>& keys) {
   const auto last = [](const std::string& key) { return key.substr(key.rfind('.') + 1); };
   for (const std::string& key : keys) ++counts[last(key)];
   std::vector<std::string> names;
+  names.reserve(keys.size());
   for (const std::string& key : keys) names.push_back(counts[last(key)] > 1 ? key : last(key));
   return names;
 }

@@ -81,7 +81,7 @@ std::string terms_of(const Candidate& c) {
 
 }  // namespace
 
-Recorder::Recorder(std::filesystem::path directory, const std::string& resolved_yaml)
+Recorder::Recorder(const std::filesystem::path& directory, const std::string& resolved_yaml)
     : directory_(made_folder(directory)),
       truth_((write_atomically(directory_ / "resolved.yaml", resolved_yaml),
               open("truth.tum", kTumHeader + "(true X_OB)\n"))),
@@ -133,13 +133,13 @@ void Recorder::sample(Stamp stamp, const FlightSample& sample) {
   if (sample.truth_X_OB) append(truth_, tum_row(stamp, *sample.truth_X_OB));
   if (sample.estimate_X_OB) append(estimate_, tum_row(stamp, *sample.estimate_X_OB));
   for (const auto& [name, X_OB] : sample.others_X_OB) {
-    const auto [file, is_new] = others_.try_emplace(name);
+    const auto [place, is_new] = others_.try_emplace(name);
+    std::optional<GrowingFile>& file = place->second;
     if (is_new) {
-      attempt([&] {
-        file->second.emplace(open(name + ".tum", kTumHeader + "(X_OB as " + name + " has it)\n"));
-      });
+      const std::string header = fmt::format("{}(X_OB as {} has it)\n", kTumHeader, name);
+      attempt([&, tum = name + ".tum"] { file.emplace(open(tum, header)); });
     }
-    if (file->second) append(*file->second, tum_row(stamp, X_OB));
+    if (file) append(*file, tum_row(stamp, X_OB));
   }
   if (!sample.row) return;
   const FlightRow& row = *sample.row;

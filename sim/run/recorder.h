@@ -46,7 +46,7 @@ class Recorder {
  public:
   /// Creates the folder if need be, removes an older run's files and writes resolved.yaml.
   /// @throws DiskError.
-  Recorder(std::filesystem::path directory, const std::string& resolved_yaml);
+  Recorder(const std::filesystem::path& directory, const std::string& resolved_yaml);
   ~Recorder();
 
   void event(const Event& event);

@@ -39,9 +39,9 @@ void check_points(const Scenario& scenario, const worlds::World& world, const st
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::string fault = fault_of(points[i], world);
     if (fault.empty()) continue;
-    throw ConfigError(where_given(scenario.source, list, i) + ": point " + std::to_string(i + 1) +
-                      " of mission." + list + " " + fault +
-                      ", expected a place above the ground of the world");
+    throw ConfigError(
+        fmt::format("{}: point {} of mission.{} {}, expected a place above the ground of the world",
+                    where_given(scenario.source, list, i), i + 1, list, fault));
   }
 }
 
@@ -214,7 +214,7 @@ std::string broken_world_rule(const ScenarioConfig& config) {
   const Vec2 rounding = Vec2::Constant(1e-6);
   const auto known = worlds::extent_of(config.world);
   if (!known) return "";  // nothing to see is beyond the edge of what was surveyed
-  const Eigen::AlignedBox2d world = *known;
+  const Eigen::AlignedBox2d& world = *known;
   const Eigen::AlignedBox2d about(world.min() - rounding, world.max() + rounding);
   if (about.contains(config.stack.exploration.explorer.bounds.extent())) return "";
   return fmt::format(

@@ -22,7 +22,7 @@
 #include "semantics/semantic_config.h"
 #include "sensors/imu.h"
 #include "sensors/mocap_device.h"
-#include "stack/stack.h"
+#include "stack/stack_config.h"
 #include "worlds/recipes.h"
 
 namespace arex::sim {

@@ -96,7 +96,7 @@ ReplanMachine::ReplanMachine(const ReplanConfig& config, const LocalPlannerConfi
 
 void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now) {
   target_ = target;
-  guide_ = config_.follow_guide ? std::move(guide) : std::vector<Vec3>{};
+  guide_ = std::move(guide);
   progress_.begin(now);
   new_guide_ = false;
   detours_ = 0;

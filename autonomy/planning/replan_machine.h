@@ -58,7 +58,6 @@ struct ReplanConfig {
   double back_off_speed_mps = 0.7;
   double track_spacing_m = 0.2;  ///< between kept points of the flown path
   int track_points = 60;
-  bool follow_guide = true;
 
   void fields(auto& f) {
     f("check_rate_hz", check_rate_hz, "collision checks (paper, III-A)");
@@ -79,8 +78,6 @@ struct ReplanConfig {
     f("back_off_speed_mps", back_off_speed_mps, "speed of that");
     f("track_spacing_m", track_spacing_m, "between kept points of the flown path");
     f("track_points", track_points, "kept points of the flown path");
-    f("follow_guide", follow_guide,
-      "to a target along the known-free cells; false: straight, whatever lies between (paper)");
     f.check(check_rate_hz >= 1 && check_rate_hz <= 1000, "1 <= check_rate_hz <= 1000");
     f.check(horizon_m > 0 && horizon_m <= 60, "0 < horizon_m <= 60");
     f.check(planning_latency_s >= 0, "planning_latency_s >= 0");
@@ -130,7 +127,6 @@ class ReplanMachine {
   void set_target(const Vec3& target, std::vector<Vec3> guide, Stamp now);
   /// A better guide to the same target, as the map grows.
   void set_guide(std::vector<Vec3> guide) {
-    if (!config_.follow_guide) return;
     guide_ = std::move(guide);
     new_guide_ = true;
   }

@@ -398,15 +398,13 @@ TEST(ReplanMachine, FollowsAGuideAroundWhatTheGridDoesNotShow) {
 
 TEST(ReplanMachine, AsPrintedItFliesStraightAndTurnsTowardsTheTargetAtOnce) {
   const test::TestGrid grid(300, 300, 30, 0.1, {-15, -15, 0});
-  ReplanConfig config;
-  config.follow_guide = false;
   YawConfig yaw;
   yaw.mode = YawMode::kTowardsTarget;
-  ReplanMachine machine(config, LocalPlannerConfig(), yaw, 1);
+  ReplanMachine machine(ReplanConfig(), LocalPlannerConfig(), yaw, 1);
   const Vec3 start(10, 10, 1.5), target(-10, -10, 1.5);  // behind: heading is +x
   Flight flight(machine, start);
   flight.step(grid.view());
-  machine.set_target(target, {start, {10, -10, 1.5}, target}, flight.now_);
+  machine.set_target(target, {}, flight.now_);
   const Vec3 way = (target - start).normalized();
   for (int i = 0; i < 6000 && machine.has_target(); ++i) {
     const Vec3 before = flight.last_.p_OB;

@@ -168,6 +168,8 @@ void SurfelMap::prefetch(const Vec3& p_O) const {
     const std::size_t mask = level.slots.size() - 1;
     __builtin_prefetch(&level.slots[mix_bits(key_of(p_G, level.inverse_edge)) & mask]);
   }
+  // GCC takes a function of nothing but prefetches for pure and drops the calls that it sees.
+  asm volatile("");
 }
 
 SurfelMap::Fit SurfelMap::fit(int count, double weight, const Vec3& mean, const Mat3& covariance) {

@@ -9,9 +9,6 @@ namespace {
 
 /// Of a reading that is held while the vehicle goes on, m/s^2/sqrt(Hz).
 constexpr double kHeldAccelNoise = 1;
-/// An estimate of t_d beyond so many sigma of its prior gets one so much wider.
-constexpr double kStrained = 2, kWider = 3;
-constexpr double kWidestDelayPrior = 0.1;  // s
 
 using PoseColumns = Eigen::Matrix<double, kErrorDim, PoseInformation::kDim>;
 /// First index in the error state of each block of a PoseInformation.
@@ -58,7 +55,6 @@ struct ErrorStateFilter::Gain {
 void ErrorStateFilter::reset(const NavigationState& x, const ErrorMatrix& P) {
   x_ = x;
   P_ = P;
-  delay_prior_std_ = std::sqrt(P(kTimeOffset, kTimeOffset));
 }
 
 void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
@@ -119,17 +115,6 @@ void ErrorStateFilter::finish(const NavigationState& x, const PoseInformation& i
   P_ = I_KH * g.P * I_KH.transpose() + MA * g.M.transpose();
   P_ = (0.5 * (P_ + P_.transpose())).eval();
   x_ = x;
-  widen_delay_prior();
-}
-
-/// Clocks are synchronised, or they are far off: no Gaussian is both. A prior as wide as the second
-/// kind lets the shaking of a take-off pass for a delay of the first, and the map keeps the tilt
-/// that comes of it.
-void ErrorStateFilter::widen_delay_prior() {
-  const double off = std::abs(x_.t_d - noise_.delay_s);
-  if (off <= kStrained * delay_prior_std_ || delay_prior_std_ >= kWidestDelayPrior) return;
-  P_(kTimeOffset, kTimeOffset) += (kWider * kWider - 1) * delay_prior_std_ * delay_prior_std_;
-  delay_prior_std_ *= kWider;
 }
 
 PoseInformation::Matrix ErrorStateFilter::pose_covariance() const {

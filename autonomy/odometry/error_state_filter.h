@@ -56,13 +56,11 @@ class ErrorStateFilter {
 
  private:
   struct Gain;
-  void widen_delay_prior();
   [[nodiscard]] Gain gain(const NavigationState& x, const PoseInformation& information) const;
 
   ImuNoiseConfig noise_;
   NavigationState x_;
   ErrorMatrix P_ = ErrorMatrix::Identity();
-  double delay_prior_std_ = 0;  ///< of t_d, s
 };
 
 template <int Rows>

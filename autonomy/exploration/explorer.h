@@ -63,6 +63,8 @@ struct Decision {
   std::string_view source;
   std::vector<Candidate> candidates;  ///< empty where a target is kept or the battery decided
   std::optional<std::size_t> winner;  ///< index into candidates
+  /// Where the revenue is direction-aware: which one R would have chosen instead of R_d and case C.
+  std::optional<std::size_t> undirected_winner;
   /// Of a stop for want of candidates: the largest f_I of all frontiers that the exhaustive search
   /// still reaches, whatever the filters and the blacklist made of them.
   std::optional<double> open_frontier_m2;

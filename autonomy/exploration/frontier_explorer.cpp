@@ -113,7 +113,8 @@ void FrontierExplorer::go_on(Decision& decision, const ExplorationSpace& space,
                              const ExplorerInput& input) {
   choose(decision, space, input);
   if (!decision.winner) {
-    if (!go_back(decision, space, input)) stop(decision, space);
+    const bool ends = !config_.stop.exhaustive || !go_back(decision, space, input);
+    if (ends) stop(decision, space);
     return;
   }
   lost_ways_back_ = 0;

@@ -23,13 +23,26 @@ void evaluate_revenue(Candidate& candidate, const RevenueConfig& config) {
   if (config.direction_aware) candidate.revenue -= candidate.direction;
 }
 
-std::optional<std::size_t> best_candidate(std::span<const Candidate> candidates) {
+namespace {
+
+template <class Revenue>
+std::optional<std::size_t> best_by(std::span<const Candidate> candidates, const Revenue& revenue) {
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (candidates[i].verdict != Verdict::kKept) continue;
-    if (!best || candidates[i].revenue > candidates[*best].revenue) best = i;
+    if (!best || revenue(candidates[i]) > revenue(candidates[*best])) best = i;
   }
   return best;
+}
+
+}  // namespace
+
+std::optional<std::size_t> best_candidate(std::span<const Candidate> candidates) {
+  return best_by(candidates, [](const Candidate& c) { return c.revenue; });
+}
+
+std::optional<std::size_t> best_undirected(std::span<const Candidate> candidates) {
+  return best_by(candidates, [](const Candidate& c) { return c.revenue + c.direction; });
 }
 
 }  // namespace arex

@@ -63,4 +63,7 @@ void evaluate_revenue(Candidate& candidate, const RevenueConfig& config);
 /// Index of the kept candidate with the largest revenue, the first of equals; none without any.
 [[nodiscard]] std::optional<std::size_t> best_candidate(std::span<const Candidate> candidates);
 
+/// The same by R alone, where the candidates have their R_d.
+[[nodiscard]] std::optional<std::size_t> best_undirected(std::span<const Candidate> candidates);
+
 }  // namespace arex

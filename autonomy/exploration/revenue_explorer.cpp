@@ -13,6 +13,7 @@ void RevenueExplorer::choose(Decision& decision, const ExplorationSpace& space,
     decision.source = kNames[static_cast<std::size_t>(source)];
     decision.candidates = assess(source, space, input);
     if (any_worthwhile(decision.candidates)) return select(decision);
+    if (!config().stop.exhaustive) return;
   }
 }
 
@@ -41,6 +42,7 @@ std::vector<Candidate> RevenueExplorer::assess(Source source, const ExplorationS
 
 void RevenueExplorer::select(Decision& decision) {
   if (config().revenue.direction_aware) {
+    decision.undirected_winner = best_undirected(decision.candidates);
     apply_direction_filter(decision.candidates, config().filter);
   }
   decision.winner = best_candidate(decision.candidates);

@@ -20,9 +20,10 @@ inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_ca
 
 struct StopConfig {
   double min_area_m2 = 0.3;
+  bool exhaustive = true;
   double reserve_fraction = 0.2;       ///< 80 % discharge (models/arex/README.md)
   double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
-  bool return_home = true;             ///< handed down from mission.land_at_start
+  bool return_home = true;             ///< handed down from mission.land_at_start, where it is true
   double return_speed_mps = 1.0;  ///< handed down: the fraction of planning.local's speed limit
   double landing_s = 20;
   double landing_clearance_m = 1.0;  ///< the vehicle's 0.3 m and a drift of twice that
@@ -31,6 +32,9 @@ struct StopConfig {
 
   void fields(auto& f) {
     f("min_area_m2", min_area_m2, "stop when no candidate has more unknown area than this");
+    f("exhaustive", exhaustive,
+      "before it ends for want of candidates: search the whole map for frontiers, and fly back to "
+      "what cannot be reached any more; false: the trees' word ends it (paper)");
     f("reserve_fraction", reserve_fraction, "of the battery's energy, not to be touched");
     f("return_speed_fraction", return_speed_fraction,
       "mean speed on the way home, part of planning.local.max_speed_mps");
@@ -55,8 +59,10 @@ struct EnergyBalance {
   double left_wh = 0;     ///< believed to be in the battery
   double needed_wh = 0;   ///< way home and landing, with the margin
   double reserve_wh = 0;  ///< to be left after landing
+  double home_wh = 0;     ///< way home and landing, with the margin, whether it lands there or not
 
   [[nodiscard]] bool must_stop() const { return left_wh - reserve_wh <= needed_wh; }
+  [[nodiscard]] bool reaches_home() const { return left_wh - reserve_wh > home_wh; }
   /// Whether even without the reserve it would not get home: land instead.
   [[nodiscard]] bool out_of_reach() const { return left_wh < needed_wh; }
 };

@@ -29,23 +29,23 @@ void for_doubling_shifts(int n, const Dilate& dilate) {
   }
 }
 
-/// Expands one row by -n..n.
-void dilate_row(std::uint64_t* row, int words, int n) {
-  for_doubling_shifts(n, [&](int s) { dilate_up(row, words, s); });
-  for_doubling_shifts(n, [&](int s) { dilate_down(row, words, s); });
+/// Expands one row by -down..up.
+void dilate_row(std::uint64_t* row, int words, int up, int down) {
+  for_doubling_shifts(up, [&](int s) { dilate_up(row, words, s); });
+  for_doubling_shifts(down, [&](int s) { dilate_down(row, words, s); });
 }
 
-/// Expands a line of `count` blocks of `block` words, `stride` words apart, by -n..n blocks.
-void dilate_blocks(std::uint64_t* data, int count, int block, int stride, int n) {
+/// Expands a line of `count` blocks of `block` words, `stride` words apart, by -down..up blocks.
+void dilate_blocks(std::uint64_t* data, int count, int block, int stride, int up, int down) {
   const auto merge = [&](int to, int from) {
     std::uint64_t* const a = data + static_cast<std::ptrdiff_t>(to) * stride;
     const std::uint64_t* const b = data + static_cast<std::ptrdiff_t>(from) * stride;
     for (int i = 0; i < block; ++i) a[i] |= b[i];
   };
-  for_doubling_shifts(n, [&](int s) {
+  for_doubling_shifts(up, [&](int s) {
     for (int k = count - 1; k >= s; --k) merge(k, k - s);
   });
-  for_doubling_shifts(n, [&](int s) {
+  for_doubling_shifts(down, [&](int s) {
     for (int k = 0; k + s < count; ++k) merge(k, k + s);
   });
 }
@@ -67,24 +67,24 @@ Inflation::Inflation(double lambda_m, double resolution_m, InflationShape shape)
 }
 
 void Inflation::apply(const BitGrid& occupied, BitGrid& inflated) {
-  if (shape_ == InflationShape::kCubic) {
-    inflated.bits = occupied.bits;
-    apply_cubic(inflated);
-  } else {
+  if (shape_ == InflationShape::kSpherical) {
     apply_spherical(occupied, inflated);
+  } else {
+    inflated.bits = occupied.bits;
+    expand_box(inflated, shape_ == InflationShape::kPrinted ? 0 : reach_, reach_);
   }
 }
 
-void Inflation::apply_cubic(BitGrid& grid) const {
-  if (reach_ == 0) return;
+void Inflation::expand_box(BitGrid& grid, int up, int down) {
+  if (up == 0 && down == 0) return;
   for (int h = 0; h < grid.rows_h; ++h) {
     for (int w = 0; w < grid.rows_w; ++w) {
-      if (!is_empty(grid.row(h, w), grid.words)) dilate_row(grid.row(h, w), grid.words, reach_);
+      if (!is_empty(grid.row(h, w), grid.words)) dilate_row(grid.row(h, w), grid.words, up, down);
     }
-    dilate_blocks(grid.row(h, 0), grid.rows_w, grid.words, grid.words, reach_);
+    dilate_blocks(grid.row(h, 0), grid.rows_w, grid.words, grid.words, up, down);
   }
   const int layer = grid.rows_w * grid.words;
-  dilate_blocks(grid.bits.data(), grid.rows_h, layer, layer, reach_);
+  dilate_blocks(grid.bits.data(), grid.rows_h, layer, layer, up, down);
 }
 
 void Inflation::apply_spherical(const BitGrid& occupied, BitGrid& inflated) {
@@ -99,7 +99,7 @@ void Inflation::apply_spherical(const BitGrid& occupied, BitGrid& inflated) {
       for (int n = 0; n <= reach; ++n) {  // the row expanded by every half width that occurs
         std::uint64_t* const out = &wide[static_cast<std::size_t>(n * words)];
         std::copy_n(n == 0 ? row : out - words, words, out);
-        if (n > 0) dilate_row(out, words, 1);
+        if (n > 0) dilate_row(out, words, 1, 1);
       }
       for (int dh = std::max(-reach, -h); dh <= std::min(reach, occupied.rows_h - 1 - h); ++dh) {
         for (int dw = std::max(-reach, -w); dw <= std::min(reach, occupied.rows_w - 1 - w); ++dw) {

@@ -33,8 +33,9 @@ struct BitGrid {
 /// Expands obstacles by lambda_inflat (paper, eq. (13)).
 ///
 /// kCubic: the offsets -n..n along each axis, n = ceil(lambda / size). For a lambda on the grid
-/// that is the paper's point set with a, b, c in 0..2n; the printed n_step = n would cover one
-/// octant only. kSpherical: the offsets whose length is at most lambda.
+/// that is the paper's point set with a, b, c in 0..2n. kPrinted: the offsets -n..0, its point set
+/// to the letter (n_step = n), which covers one octant only. kSpherical: the offsets whose length
+/// is at most lambda.
 ///
 /// The whole grid is expanded anew, 64 cells at a time: cheaper than keeping counts for the cells
 /// that change, and there is no state that could go astray.
@@ -46,7 +47,8 @@ class Inflation {
   void apply(const BitGrid& occupied, BitGrid& inflated);
 
  private:
-  void apply_cubic(BitGrid& grid) const;
+  /// @param up, down cells towards higher and lower indices
+  static void expand_box(BitGrid& grid, int up, int down);
   void apply_spherical(const BitGrid& occupied, BitGrid& inflated);
 
   InflationShape shape_;

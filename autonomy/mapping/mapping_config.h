@@ -26,9 +26,9 @@ struct SensorModelConfig {
   }
 };
 
-enum class InflationShape { kCubic, kSpherical };
-constexpr std::array<std::string_view, 2> enum_names(InflationShape) {
-  return {"cubic", "spherical"};
+enum class InflationShape { kCubic, kSpherical, kPrinted };
+constexpr std::array<std::string_view, 3> enum_names(InflationShape) {
+  return {"cubic", "spherical", "printed"};
 }
 
 /// The rolling grid that the local planner flies in (paper, Environment Representation).
@@ -53,7 +53,9 @@ struct LocalGridConfig {
     f("remember", remember, "obstacles hit in confirm_frames frames stay while evidence lasts");
     f("confirm_frames", confirm_frames, "of the frames held: hits in so many confirm an obstacle");
     f("size_m", size_m, "extent along x, y, z, centred on the vehicle (paper)");
-    f("inflation_shape", inflation_shape, "cubic (paper) or spherical");
+    f("inflation_shape", inflation_shape,
+      "cubic (as the paper means it), spherical, or printed: its offsets to the letter, one "
+      "octant");
     f("decay_per_s", decay_per_s, "log-odds per second by which what is not seen is forgotten");
     f("lone_range_m", lone_range_m,
       "nearer than this a LiDAR return without another beside it is false");

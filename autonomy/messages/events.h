@@ -25,12 +25,14 @@ enum class EventKind : std::uint8_t {
   kSensorFault,     ///< an injected or detected fault
   kCollision,       ///< detail: class and object hit, speed
   kMapFull,         ///< a map has no room left; detail: which, and what is left out
+  kOperator,        ///< detail: a command that was taken or refused, or the state of the link
   kFinished,        ///< detail: outcome and reason
 };
-inline constexpr std::array<std::string_view, 15> kEventKindNames{
-    "mission_state",  "armed",           "disarmed",  "target_selected", "target_reached",
-    "target_dropped", "odometry_status", "planner",   "stuck",           "recovery",
-    "battery",        "sensor_fault",    "collision", "map_full",        "finished"};
+inline constexpr std::array<std::string_view, 16> kEventKindNames{
+    "mission_state",  "armed",          "disarmed",        "target_selected",
+    "target_reached", "target_dropped", "odometry_status", "planner",
+    "stuck",          "recovery",       "battery",         "sensor_fault",
+    "collision",      "map_full",       "operator",        "finished"};
 
 struct Event {
   Stamp stamp = 0;

@@ -11,6 +11,7 @@ struct MotionRequest {
     kTakeoff,  ///< straight up to `goal`
     kLeg,      ///< to `goal` along a straight leg that is known to be free
     kGoTo,     ///< to `goal`, along whatever path the planner finds
+    kHold,     ///< come to rest where there is room and stay
     kSpin,     ///< stay at `goal` and turn at `yaw_rate_radps`
     kLand,     ///< straight down until touchdown
     kLevel,    ///< no position to hold: level, at hover thrust

@@ -32,6 +32,8 @@ MotionRequest Mission::update(const Inputs& inputs) {
     was_armed_ = inputs.armed;
   }
   watch_odometry(inputs);
+  watch_link(inputs);
+  obey(inputs);
   switch (state_) {
     case MissionState::kInitialise:
       wait_until_ready(inputs);
@@ -47,6 +49,9 @@ MotionRequest Mission::update(const Inputs& inputs) {
       break;
     case MissionState::kExplore:
       explore(inputs);
+      break;
+    case MissionState::kHold:
+      hold(inputs);
       break;
     case MissionState::kReturn:
       fly_to_landing(inputs);
@@ -162,6 +167,9 @@ void Mission::enter(MissionState state, const Inputs& inputs) {
     case MissionState::kEntry:
       waypoint_ = 0;
       break;
+    case MissionState::kHold:
+      request_ = {MotionRequest::Kind::kHold, request_.goal_O, 0, ++orders_};
+      break;
     case MissionState::kReturn:
     case MissionState::kExplore:  // hovers until the explorer's first word
       break;
@@ -230,7 +238,7 @@ void Mission::reach(const Inputs& inputs) {
 void Mission::next_waypoint(const Inputs& inputs) {
   if (waypoint_ + 1 < config_.waypoints_m.size()) {
     select_waypoint(waypoint_ + 1, inputs.now);
-  } else {
+  } else if (!end_in_the_air(inputs)) {
     land_on_command(inputs);
   }
 }
@@ -278,6 +286,7 @@ void Mission::decide(const Decision& decision) {
                                                          : EventKind::kMissionState,
             "stop exploring: " + std::string(reason));
     stop_exploring_ = true;
+    home_in_reach_ = decision.energy.reaches_home();
   } else if (decision.kind == DecisionKind::kNewTarget || decision.kind == DecisionKind::kGoBack) {
     if (decision.kind == DecisionKind::kGoBack) {
       events_(EventKind::kRecovery, "cut off from what it explored: back to where it flew");
@@ -289,11 +298,31 @@ void Mission::decide(const Decision& decision) {
 }
 
 void Mission::return_to_land(const Inputs& inputs) {
+  if (end_in_the_air(inputs)) return;
   enter(MissionState::kReturn, inputs);
-  config_.land_at_start ? go_home() : void(landing_query_.emplace());
+  using LandAtStart = MissionConfig::LandAtStart;
+  const bool asks = config_.land_at_start == LandAtStart::kIfInReach;
+  if (asks && !home_in_reach_) {
+    events_(EventKind::kBattery, "home is out of reach: lands where it can");
+  }
+  if (config_.land_at_start == LandAtStart::kTrue || (asks && home_in_reach_)) {
+    go_home();
+  } else {
+    landing_query_.emplace();
+  }
+}
+
+bool Mission::end_in_the_air(const Inputs& inputs) {
+  if (!config_.remain_at_end || inputs.at_reserve) return false;
+  events_(EventKind::kMissionState, "ends in the air");
+  begin_hold({OperatorCommand::Kind::kHold, Vec3::Zero()}, inputs);
+  return true;
 }
 
 void Mission::go_home() {
+  landing_query_.reset();  // whatever was asked before
+  landing_.reset();
+  has_answer_ = false;
   request_ = {MotionRequest::Kind::kGoTo, home_O_};
   events_(EventKind::kTargetSelected, describe(request_.goal_O));
 }
@@ -309,6 +338,7 @@ void Mission::land_on_command(const Inputs& inputs) {
 }
 
 void Mission::answer(const std::optional<LandingPlace>& place) {
+  if (!landing_query_) return;  // it has thought better of it
   landing_query_.reset();
   landing_ = place;
   has_answer_ = true;
@@ -368,7 +398,7 @@ void Mission::spin(const Inputs& inputs) {
   const Stamp phase = (inputs.now - state_since_) / from_seconds(config_.yaw_burst_s);
   const auto burst = static_cast<std::size_t>(phase / 2);
   if (burst >= config_.yaw_rates_radps.size()) {
-    land_on_command(inputs);
+    if (!end_in_the_air(inputs)) land_on_command(inputs);
     return;
   }
   const double rate = phase % 2 == 0 ? config_.yaw_rates_radps[burst] : 0.0;
@@ -378,15 +408,114 @@ void Mission::spin(const Inputs& inputs) {
 }
 
 bool Mission::has_arrived(const Inputs& inputs) {
-  const bool inside =
-      (inputs.odometry.X_OB.p - request_.goal_O).norm() < config_.arrival_radius_m &&
-      inputs.odometry.v_OB.norm() < config_.arrival_speed_mps;
-  if (!inside) {
+  return rests(inputs,
+               (inputs.odometry.X_OB.p - request_.goal_O).norm() < config_.arrival_radius_m);
+}
+
+bool Mission::rests(const Inputs& inputs, bool inside) {
+  if (!inside || inputs.odometry.v_OB.norm() >= config_.arrival_speed_mps) {
     inside_since_ = -1;
     return false;
   }
   if (inside_since_ < 0) inside_since_ = inputs.now;
   return inputs.now - inside_since_ >= from_seconds(config_.hold_s);
+}
+
+void Mission::hear(const OperatorMessage& message, Stamp now) {
+  heard_ = now;
+  if (std::exchange(link_lost_, false)) events_(EventKind::kOperator, "link is back");
+  if (message.command) command_ = message.command;
+}
+
+void Mission::watch_link(const Inputs& inputs) {
+  if (heard_ < 0 || link_lost_ || inputs.now - heard_ < from_seconds(config_.link.timeout_s)) {
+    return;
+  }
+  link_lost_ = true;
+  const auto names = enum_names(config_.link.lost);
+  events_(EventKind::kOperator,
+          "link lost: " + std::string(names[static_cast<std::size_t>(config_.link.lost)]));
+  const bool comes_down =
+      state_ == MissionState::kReturn || !inputs.armed;  // as it is asked to, or was
+  if (comes_down || config_.link.lost == LinkConfig::Lost::kContinue) return;
+  command_ = {config_.link.lost == LinkConfig::Lost::kReturn ? OperatorCommand::Kind::kReturn
+                                                             : OperatorCommand::Kind::kLand,
+              Vec3::Zero()};
+}
+
+void Mission::obey(const Inputs& inputs) {
+  const std::optional<OperatorCommand> command = std::exchange(command_, std::nullopt);
+  if (!command) return;
+  const std::string name(enum_names(command->kind)[static_cast<std::size_t>(command->kind)]);
+  const bool flies = inputs.armed && state_ != MissionState::kInitialise &&
+                     state_ != MissionState::kLand && state_ != MissionState::kLost &&
+                     state_ != MissionState::kDone;
+  const bool resumes = command->kind == OperatorCommand::Kind::kResume;
+  if (!flies || (resumes && state_ != MissionState::kHold)) {
+    events_(EventKind::kOperator,
+            name + " refused in state " +
+                std::string(kMissionStateNames[static_cast<std::size_t>(state_)]));
+    return;
+  }
+  events_(EventKind::kOperator, name);
+  resumes ? resume(inputs) : begin_hold(*command, inputs);
+}
+
+void Mission::begin_hold(const OperatorCommand& command, const Inputs& inputs) {
+  if (state_ != MissionState::kHold) {
+    held_ = state_;
+    held_request_ = request_;
+  }
+  asked_ = command;
+  enter(MissionState::kHold, inputs);
+}
+
+void Mission::resume(const Inputs& inputs) {
+  state_ = held_;
+  request_ = held_request_;
+  inside_since_ = -1;
+  progress_.begin(inputs.now);
+  events_(EventKind::kMissionState,
+          std::string(kMissionStateNames[static_cast<std::size_t>(state_)]));
+}
+
+// Whatever is asked, it comes to rest first.
+void Mission::hold(const Inputs& inputs) {
+  if (inputs.at_reserve && asked_.kind != OperatorCommand::Kind::kLand) {
+    events_(EventKind::kBattery, "at the reserve: lands");
+    asked_ = {OperatorCommand::Kind::kLand, Vec3::Zero()};
+    enter(MissionState::kHold, inputs);
+  }
+  if (request_.kind == MotionRequest::Kind::kHold) {
+    if (rests(inputs, true)) do_as_asked(inputs);
+  } else if (inputs.progress == MotionProgress::kArrived) {
+    reach(inputs);
+    begin_hold({OperatorCommand::Kind::kHold, Vec3::Zero()}, inputs);
+  } else if (inputs.progress == MotionProgress::kFailed) {
+    events_(EventKind::kStuck, std::string(inputs.cause));
+    events_(EventKind::kTargetDropped, describe(request_.goal_O));
+    begin_hold({OperatorCommand::Kind::kHold, Vec3::Zero()}, inputs);
+  }
+}
+
+void Mission::do_as_asked(const Inputs& inputs) {
+  switch (asked_.kind) {
+    case OperatorCommand::Kind::kLand:
+      request_.goal_O = inputs.odometry.X_OB.p;
+      land_on_command(inputs);
+      break;
+    case OperatorCommand::Kind::kReturn:
+      enter(MissionState::kReturn, inputs);
+      go_home();
+      break;
+    case OperatorCommand::Kind::kGoTo:
+      request_ = {MotionRequest::Kind::kGoTo, asked_.goal_O, 0, ++orders_};
+      events_(EventKind::kTargetSelected, describe(request_.goal_O));
+      break;
+    case OperatorCommand::Kind::kHold:
+    case OperatorCommand::Kind::kResume:
+      break;
+  }
 }
 
 }  // namespace arex

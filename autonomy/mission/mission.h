@@ -14,8 +14,27 @@
 #include "messages/events.h"
 #include "messages/motion.h"
 #include "messages/odometry_need.h"
+#include "messages/operator.h"
 
 namespace arex {
+
+/// What becomes of a mission whose operator is not heard any more.
+struct LinkConfig {
+  enum class Lost { kContinue, kReturn, kLand };
+  friend constexpr std::array<std::string_view, 3> enum_names(Lost) {
+    return {"continue", "return", "land"};
+  }
+
+  double timeout_s = 5;  ///< ArduPilot's FS_GCS_TIMEOUT
+  Lost lost = Lost::kContinue;
+
+  void fields(auto& f) {
+    f("timeout_s", timeout_s,
+      "without a heartbeat for longer the link is lost, if there was one (ArduPilot: 5 s)");
+    f("lost", lost, "what the vehicle does then");
+    f.check(timeout_s > 0, "timeout_s > 0");
+  }
+};
 
 /// What the vehicle is sent out to do. Positions are in O: origin where it stood at start-up, x its
 /// heading then, z up.
@@ -42,12 +61,18 @@ struct MissionConfig {
   double leg_timeout_s = 20;       ///< on a leg or a landing, without getting on
   double max_time_s = 600;
   std::vector<Vec3> entry_m;  ///< straight legs flown before exploring (garage: down the ramp)
-  bool land_at_start = true;  ///< of an exploration; false: where it ends (garage)
-  int return_tries = 3;       ///< before it lands at a clear place on the way
+  enum class LandAtStart { kFalse, kTrue, kIfInReach };
+  friend constexpr std::array<std::string_view, 3> enum_names(LandAtStart) {
+    return {"false", "true", "if_in_reach"};
+  }
+  LandAtStart land_at_start = LandAtStart::kTrue;  ///< of an exploration
+  bool remain_at_end = false;
+  int return_tries = 3;                          ///< before it lands at a clear place on the way
   std::vector<double> yaw_rates_radps{1, 2, 3};  ///< of a yaw burst, one after the other
   double yaw_burst_s = 4.0;                      ///< length of each
   double lost_hover_s = 1.0;  ///< without odometry: level at hover thrust, then down
   LandingConfig landing;
+  LinkConfig link;
 
   void fields(auto& f) {
     f("kind", kind, "what the vehicle is sent out to do");
@@ -68,8 +93,14 @@ struct MissionConfig {
     f("max_time_s", max_time_s, "the mission fails when it is not over by then");
     f("entry_m", entry_m, "x, y, z in O: straight legs flown before exploring");
     f("land_at_start", land_at_start,
-      "an exploration keeps energy for the way home and lands there; false: it lands where it "
-      "ends");
+      "true: an exploration keeps energy for the way home and lands there; false: it lands where "
+      "it "
+      "ends; if_in_reach: it explores to its end, then comes home if what is left suffices for it "
+      "and the reserve, or else lands where it is");
+    f("remain_at_end", remain_at_end,
+      "it stays in the air where it ends until its operator asks for something or the battery is "
+      "at its reserve");
+    f("link", link, "to the operator");
     f("return_tries", return_tries, "failed ways home before it lands at a clear place on the way");
     f("yaw_rates_radps", yaw_rates_radps, "of a yaw burst, one after the other");
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
@@ -98,13 +129,14 @@ enum class MissionState {
   kEntry,  ///< legs into the area to explore
   kFly,    ///< waypoints, goals, yaw bursts
   kExplore,
+  kHold,    ///< at the operator's word: comes to rest, then does what was asked
   kReturn,  ///< to the start, or to where it lands instead; hovers while it asks where that is
   kLand,
   kLost,
   kDone,
 };
-inline constexpr std::array<std::string_view, 9> kMissionStateNames{
-    "initialise", "takeoff", "entry", "fly", "explore", "return", "land", "lost", "done"};
+inline constexpr std::array<std::string_view, 10> kMissionStateNames{
+    "initialise", "takeoff", "entry", "fly", "explore", "hold", "return", "land", "lost", "done"};
 
 /// A target that was flown to.
 struct MissionTarget {
@@ -136,9 +168,13 @@ class Mission {
     std::string_view cause;                               ///< why it failed
     bool leg_blocked = false;                             ///< something stands in the way of a kLeg
     LandingGround below = LandingGround::kUnknown;        ///< where it would come down
+    bool at_reserve = false;  ///< of the battery: what is left is needed to land
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);
+
+  /// Takes what comes over the operator's link.
+  void hear(const OperatorMessage& message, Stamp now);
 
   /// Takes the explorer's word while exploring.
   void decide(const Decision& decision);
@@ -182,6 +218,14 @@ class Mission {
   void select_waypoint(std::size_t index, Stamp now);
   void spin(const Inputs& inputs);
   void watch_odometry(const Inputs& inputs);
+  void watch_link(const Inputs& inputs);
+  void obey(const Inputs& inputs);
+  void begin_hold(const OperatorCommand& command, const Inputs& inputs);
+  void hold(const Inputs& inputs);
+  void do_as_asked(const Inputs& inputs);
+  void resume(const Inputs& inputs);
+  [[nodiscard]] bool end_in_the_air(const Inputs& inputs);
+  bool rests(const Inputs& inputs, bool inside);
   bool has_arrived(const Inputs& inputs);
 
   static constexpr double kProgress_m = 0.1;  ///< beyond what a hover wanders
@@ -210,6 +254,14 @@ class Mission {
   MissionState interrupted_ = MissionState::kFly;  ///< what goes on when the odometry is back
   MotionRequest interrupted_request_;
   std::vector<MissionTarget> targets_;
+  Stamp heard_ = -1;  ///< the last heartbeat, -1: none yet
+  bool link_lost_ = false;
+  std::optional<OperatorCommand> command_;  ///< heard since the last step
+  OperatorCommand asked_;                   ///< what a hold is for
+  MissionState held_ = MissionState::kFly;  ///< what it interrupted
+  MotionRequest held_request_;
+  int orders_ = 0;
+  bool home_in_reach_ = true;
 };
 
 }  // namespace arex

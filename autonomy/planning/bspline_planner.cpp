@@ -344,18 +344,20 @@ void BsplinePlanner::climb_ladder(const GridView& grid, const PlanRequest& reque
     result.status = PlanStatus::kNoPath;
     return;
   }
-  const std::vector<Vec3> corners = shortcut(grid, way.path, kShortcutMargins[0]);
-  const std::vector<Vec3> guided = round_corners(corners, config_.control_point_distance_m);
   // Where the first rungs failed it is tight: ask for less room.
   const double tight = config_.tight_share * config_.safe_distance_m;
-  if (attempt(PlanStage::kGuided, guided, tight)) return;
-  if (request.start.v.norm() > kAtRest || request.start.a.norm() > kAtRest) {
-    auto joined = join_and_follow(grid, way.path, request.start, limit);
-    if (accept(PlanStage::kPathFollowing, std::move(joined))) return;
-    if (accept(PlanStage::kStopAndFollow, stop_and_follow(grid, request, diagnostics))) return;
-  } else if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit,
-                                                           config_.timing_knot_span_s))) {
-    return;
+  if (config_.grid_fallback) {
+    const std::vector<Vec3> corners = shortcut(grid, way.path, kShortcutMargins[0]);
+    const std::vector<Vec3> guided = round_corners(corners, config_.control_point_distance_m);
+    if (attempt(PlanStage::kGuided, guided, tight)) return;
+    if (request.start.v.norm() > kAtRest || request.start.a.norm() > kAtRest) {
+      auto joined = join_and_follow(grid, way.path, request.start, limit);
+      if (accept(PlanStage::kPathFollowing, std::move(joined))) return;
+      if (accept(PlanStage::kStopAndFollow, stop_and_follow(grid, request, diagnostics))) return;
+    } else if (accept(PlanStage::kPathFollowing, follow_path(grid, way.path, request.start, limit,
+                                                             config_.timing_knot_span_s))) {
+      return;
+    }
   }
   for (int i = 0; i < config_.random_starts; ++i) {
     if (attempt(PlanStage::kRandom, random_path(request, i), tight)) return;

@@ -35,6 +35,7 @@ struct LocalPlannerConfig {
   int max_rebounds = 6;
   int random_starts = 1;
   double random_amplitude = 0.3;  ///< of the distance
+  bool grid_fallback = true;
   SearchConfig search;
 
   double timing_knot_span_s = 0.05;   ///< of path-following splines
@@ -81,6 +82,9 @@ struct LocalPlannerConfig {
     f("max_rebounds", max_rebounds, "minimisations before an initial path is given up");
     f("random_starts", random_starts, "random polynomials tried");
     f("random_amplitude", random_amplitude, "sideways reach of those, share of the distance");
+    f("grid_fallback", grid_fallback,
+      "where the optimiser's own initial paths fail, a path of the grid search is optimised, then "
+      "followed, slower; false: random initial paths only (EGO-Planner)");
     f("search", search, "A* budgets");
     f("timing_knot_span_s", timing_knot_span_s, "of path-following splines");
     f("evasive_knot_span_s", evasive_knot_span_s, "of stops for which that reacts too late");

@@ -108,6 +108,13 @@ void ReplanMachine::set_target(const Vec3& target, std::vector<Vec3> guide, Stam
   if (state_ == ReplanState::kExecTraj && !current_.recovery) enter(ReplanState::kReplanTraj, now);
 }
 
+void ReplanMachine::drop_target(Stamp now) {
+  target_.reset();
+  guide_.clear();
+  cause_ = StuckCause::kNone;
+  if (state_ == ReplanState::kGenNewTraj) enter(ReplanState::kWaitTarget, now);
+}
+
 std::vector<PlannerEvent> ReplanMachine::take_events() { return std::exchange(events_, {}); }
 
 void ReplanMachine::enter(ReplanState state, Stamp now) {
@@ -355,7 +362,7 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
   flight.cautious = cautious;
   flight.slowed = last_plan_.diagnostics.slowed;
   flight.reaches_target = final_target && !last_plan_.diagnostics.braked;
-  if (from_rest) {  // look first, then fly
+  if (from_rest && yaw_planner_.mode() == YawMode::kAlongPath) {  // look first, then fly
     const double wanted = yaw_planner_.wanted(flight.spline, 0.0, heading_.yaw_rad);
     flight.start += from_seconds(yaw_planner_.turn_time_s(heading_.yaw_rad, wanted));
   }
@@ -453,19 +460,26 @@ void ReplanMachine::give_up(StuckCause cause, Stamp now) {
   report(PlannerEventKind::kAskForTarget, now, cause);
 }
 
+void ReplanMachine::turn(const MotionState& state, Stamp now) {
+  const Stamp before = std::exchange(last_setpoint_, now);
+  if (before == 0 || now <= before) return;
+  if (yaw_planner_.mode() == YawMode::kTowardsTarget) {
+    if (target_) heading_ = {yaw_planner_.towards(state.p, *target_, heading_.yaw_rad), 0.0};
+    return;
+  }
+  const double t = std::max(0.0, current_.time(now));
+  const double wanted = current_.recovery
+                            ? heading_.yaw_rad
+                            : yaw_planner_.wanted(current_.spline, t, heading_.yaw_rad);
+  heading_ = yaw_planner_.step(heading_, wanted, to_seconds(now - before));
+}
+
 TrajectorySetpoint ReplanMachine::setpoint(Stamp now, double force_lag_s) {
   advance(now);
   TrajectorySetpoint setpoint;
   if (current_.spline.empty()) return setpoint;
   const MotionState state = current_.state(now);
-  if (last_setpoint_ > 0 && now > last_setpoint_) {
-    const double wanted =
-        current_.recovery ? heading_.yaw_rad
-                          : yaw_planner_.wanted(current_.spline, std::max(0.0, current_.time(now)),
-                                                heading_.yaw_rad);
-    heading_ = yaw_planner_.step(heading_, wanted, to_seconds(now - last_setpoint_));
-  }
-  last_setpoint_ = now;
+  turn(state, now);
   setpoint.p_OB = state.p;
   setpoint.v_OB = state.v;
   const Stamp acts = now + from_seconds(force_lag_s);

@@ -130,6 +130,8 @@ class ReplanMachine {
     guide_ = std::move(guide);
     new_guide_ = true;
   }
+  /// Takes the target away: it comes to rest where there is room.
+  void drop_target(Stamp now);
   /// Gives the target up: another one is needed.
   void give_up(StuckCause cause, Stamp now);
   /// Gives it up where the vehicle gets no nearer to it. tick() asks this, too.
@@ -187,6 +189,7 @@ class ReplanMachine {
   void adopt(Flight flight);
   [[nodiscard]] double way_left(const Vec3& p) const;
   [[nodiscard]] StuckCause cause_of_stall() const;
+  void turn(const MotionState& state, Stamp now);
   [[nodiscard]] MotionState state_at(Stamp stamp, const Odometry& odometry) const;
   [[nodiscard]] Vec3 local_target(const GridView& grid, const Vec3& from, double horizon_m) const;
   [[nodiscard]] std::optional<double> next_collision(const GridView& grid, double t_s) const;

@@ -21,6 +21,11 @@ double YawPlanner::wanted(const UniformBspline& spline, double t_s, double fallb
   return fallback_rad;
 }
 
+double YawPlanner::towards(const Vec3& p, const Vec3& target, double fallback_rad) const {
+  const Vec2 d = (target - p).head<2>();
+  return d.norm() >= config_.min_reach_m ? std::atan2(d.y(), d.x()) : fallback_rad;
+}
+
 Heading YawPlanner::step(const Heading& now, double wanted_rad, double dt_s) const {
   const double error = so3::wrap(wanted_rad - now.yaw_rad);
   const double a = config_.max_acceleration_radps2;

@@ -1,10 +1,19 @@
 #pragma once
 
+#include <array>
+#include <string_view>
+
 #include "planning/uniform_bspline.h"
 
 namespace arex {
 
+enum class YawMode { kAlongPath, kTowardsTarget };
+constexpr std::array<std::string_view, 2> enum_names(YawMode) {
+  return {"along_path", "towards_target"};
+}
+
 struct YawConfig {
+  YawMode mode = YawMode::kAlongPath;
   double max_rate_radps = 1.5;
   double max_acceleration_radps2 = 4.0;
   double look_ahead_s = 0.6;    ///< the heading is that of the path this much later
@@ -12,6 +21,8 @@ struct YawConfig {
   double max_offset_rad = 0.8;  ///< between heading and flight when a flight begins
 
   void fields(auto& f) {
+    f("mode", mode,
+      "along_path, within the limits below; or towards_target, at once, as the paper's PD turns");
     f("max_rate_radps", max_rate_radps, "limit of the yaw rate");
     f("max_acceleration_radps2", max_acceleration_radps2, "limit of the yaw acceleration");
     f("look_ahead_s", look_ahead_s, "the heading is that of the path this much later");
@@ -36,6 +47,11 @@ class YawPlanner {
 
   /// Heading of the path from time t on; `fallback` where it stands still.
   [[nodiscard]] double wanted(const UniformBspline& spline, double t_s, double fallback_rad) const;
+
+  /// Heading from p to a target; `fallback` once it is too near to have one.
+  [[nodiscard]] double towards(const Vec3& p, const Vec3& target, double fallback_rad) const;
+
+  [[nodiscard]] YawMode mode() const { return config_.mode; }
 
   /// One step of dt_s towards a wanted yaw within the limits on rate and acceleration: the fastest
   /// that still stops on it.

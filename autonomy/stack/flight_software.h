@@ -15,6 +15,7 @@
 #include "messages/commands.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
+#include "messages/operator.h"
 #include "messages/sensors.h"
 #include "mission/mission.h"
 #include "planning/local_planner.h"
@@ -56,6 +57,7 @@ class FlightSoftware {
   virtual void add_imu(const ImuSample& imu) = 0;                 ///< 200 Hz
   virtual void add_autopilot(const AutopilotStatus& status) = 0;  ///< 200 Hz
   virtual void add_battery(const BatterySample& battery) = 0;
+  virtual void add_operator(const OperatorMessage& message) = 0;
   virtual void add_mocap(const MocapSample& mocap) = 0;
   virtual void add_scan(const LidarScanPtr& scan) = 0;
   virtual void add_depth(const DepthImagePtr& depth) = 0;

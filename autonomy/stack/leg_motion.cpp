@@ -62,6 +62,17 @@ TrajectorySetpoint LegMotion::update(Stamp now, const MotionRequest& request,
 }
 
 void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
+  if (request.kind == MotionRequest::Kind::kHold && holds_position(request_.kind)) {
+    request_ = request;  // on the same path, whose clock comes to rest
+    blocked_ = false;
+    return;
+  }
+  if (request_.kind == MotionRequest::Kind::kHold) {
+    const TrajectorySetpoint held = path_.sample(path_time_s_);
+    path_ = TimedPath(path_config_, held.p_OB, held.yaw_rad + spin_yaw_rad_);
+    spin_yaw_rad_ = spin_rate_radps_ = 0;
+    path_time_s_ = 0;
+  }
   if (!holds_position(request_.kind)) {
     path_ = TimedPath(path_config_, odometry.X_OB.p, so3::yaw(odometry.X_OB.R));
     spin_yaw_rad_ = spin_rate_radps_ = 0;
@@ -94,7 +105,8 @@ void LegMotion::plan(const MotionRequest& request, const Odometry& odometry) {
 void LegMotion::advance_clock(Stamp now, const Odometry& odometry) {
   const double dt = to_seconds(now - last_);
   const bool degenerate = odometry.status == OdometryStatus::kDegenerate;
-  const double wanted = blocked_ ? 0.0 : degenerate ? caution_.degenerate_speed_fraction : 1.0;
+  const bool rests = blocked_ || request_.kind == MotionRequest::Kind::kHold;
+  const double wanted = rests ? 0.0 : degenerate ? caution_.degenerate_speed_fraction : 1.0;
   const double limit = caution_.change_per_s;
   const double change = std::clamp((wanted - clock_rate_) / std::max(dt, 1e-3), -limit, limit);
   clock_acceleration_ = change;

@@ -41,6 +41,14 @@ void Navigator::fly_to(const MotionRequest& request, const Odometry& odometry,
   }
 }
 
+void Navigator::hold(const MotionRequest& request, Stamp now) {
+  request_ = request;
+  ++goal_number_;
+  has_target_ = false;
+  progress_ = MotionProgress::kUnderWay;
+  machine_.drop_target(now);
+}
+
 void Navigator::start_guide(const Odometry& odometry,
                             const std::shared_ptr<const OccupancyMap2D>& map, Stamp now) {
   next_guide_ = now + from_seconds(1 / config_.guide_rate_hz);

@@ -29,6 +29,9 @@ class Navigator {
   void fly_to(const MotionRequest& request, const Odometry& odometry,
               const std::shared_ptr<const OccupancyMap2D>& map, Stamp now);
 
+  /// Comes to rest. @pre the request is a kHold.
+  void hold(const MotionRequest& request, Stamp now);
+
   /// One control step. @param grid, map the newest; may be null before the first.
   TrajectorySetpoint update(const std::shared_ptr<const GridSnapshot>& grid,
                             const std::shared_ptr<const OccupancyMap2D>& map,

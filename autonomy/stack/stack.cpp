@@ -191,10 +191,10 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ =
-      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
-                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below()});
+  request_ = mission_.update(
+      {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
+       serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
+       !navigating_ && legs_.blocked(), ground_below(), at_reserve()});
   setpoint_ = move(request_);
   return control(request_);
 }
@@ -237,8 +237,15 @@ LandingGround Stack::ground_below() const {
   return map ? landing_finder_.assess(*map, setpoint_.p_OB) : LandingGround::kUnknown;
 }
 
+bool Stack::at_reserve() const {
+  StopConfig stop = config_.exploration.explorer.stop;
+  stop.return_home = false;
+  return balance_energy(energy_, 0, stop).must_stop();
+}
+
 TrajectorySetpoint Stack::move(const MotionRequest& request) {
-  if (request.kind != MotionRequest::Kind::kGoTo) {
+  const bool holds = navigating_ && request.kind == MotionRequest::Kind::kHold;
+  if (request.kind != MotionRequest::Kind::kGoTo && !holds) {
     if (navigating_) legs_.take_over(setpoint_);
     navigating_ = false;
     // The legs into an area lead down ramps and through doors by heights that its 2D map has not.
@@ -251,7 +258,8 @@ TrajectorySetpoint Stack::move(const MotionRequest& request) {
   }
   if (!navigating_) navigator_.take_over(setpoint_, now_);
   if (!navigating_ || !(request == navigator_.request())) {
-    navigator_.fly_to(request, odometry_, perception_.map_2d(), now_);
+    holds ? navigator_.hold(request, now_)
+          : navigator_.fly_to(request, odometry_, perception_.map_2d(), now_);
   }
   navigating_ = true;
   perception_.note_flown(odometry_.X_OB.p);

@@ -40,6 +40,7 @@ class Stack : public FlightSoftware {
   void add_imu(const ImuSample& imu) override;
   void add_autopilot(const AutopilotStatus& status) override;
   void add_battery(const BatterySample& battery) override;
+  void add_operator(const OperatorMessage& message) override { mission_.hear(message, now_); }
   void add_mocap(const MocapSample& mocap) override;
   void add_scan(const LidarScanPtr& scan) override;
   void add_depth(const DepthImagePtr& depth) override;
@@ -75,6 +76,7 @@ class Stack : public FlightSoftware {
   void decide();
   void seek_landing();
   [[nodiscard]] LandingGround ground_below() const;
+  [[nodiscard]] bool at_reserve() const;
   TrajectorySetpoint move(const MotionRequest& request);
   AttitudeCommand control(const MotionRequest& request);
 

@@ -117,7 +117,7 @@ StackConfig with_shared_values(StackConfig config) {
   explorer.space.travel_radius_m = inflation;
   explorer.viewpoint.clearance_m = inflation + explorer.viewpoint.clearance_margin_m;
   explorer.viewpoint.standoff_m = inflation + explorer.viewpoint.standoff_margin_m;
-  explorer.stop.return_home = config.mission.land_at_start;
+  explorer.stop.return_home = config.mission.land_at_start == MissionConfig::LandAtStart::kTrue;
   explorer.stop.return_speed_mps = explorer.stop.return_speed_fraction * speed;
   return config;
 }

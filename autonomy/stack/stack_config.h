@@ -130,7 +130,7 @@ struct PlanningConfig {
     f("replan", replan, "replanning state machine");
     f("strategy", strategy, "who makes trajectories within the local grid (bspline, or a plug-in)");
     f("local", local, "B-spline planner");
-    f("yaw", yaw, "heading along the path");
+    f("yaw", yaw, "heading on planned ways");
     f("guide", guide, "global guide path");
     f.check(inflation_m >= 0 && inflation_m <= 2, "0 <= inflation_m <= 2");
     f.check(floor_m < ceiling_m, "floor_m < ceiling_m");

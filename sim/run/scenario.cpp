@@ -285,6 +285,10 @@ void set_seed(ConfigNode& source, std::uint64_t seed, const std::string& where) 
 Scenario load_scenario(const std::filesystem::path& file, const std::vector<std::string>& overrides,
                        std::optional<std::uint64_t> seed) {
   ConfigNode source = file.empty() ? parse_yaml("", "defaults") : load_yaml(file);
+  if (const ConfigNode* base = source.find("base")) {
+    throw ConfigError(base->where + ": 'base' makes this a sweep, expected a scenario; `arex sweep " +
+                      file.string() + " --dry-run` lists what it flies");
+  }
   for (const std::string& assignment : overrides) apply_override(source, assignment);
   if (seed) set_seed(source, *seed, "--seed");
   return make_scenario(file.stem().string(), std::move(source));

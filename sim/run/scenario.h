@@ -13,6 +13,7 @@
 #include "physics/airframe.h"
 #include "physics/physics_config.h"
 #include "run/device_section.h"
+#include "run/operator_link.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
 #include "scoring/semantic_score.h"
@@ -73,6 +74,8 @@ struct ScenarioConfig {
   std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
   StackConfig stack;
+  std::vector<OperatorOrder> commands;
+  OperatorLinkConfig operator_link;
   MissionSemanticsConfig semantics;
   ScoringConfig scoring;
 
@@ -89,11 +92,18 @@ struct ScenarioConfig {
       "...}");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
+    f("commands", commands,
+      "what the operator does: [{at_s: 120, do: hold}, {on: stop, do: land}, ...]; on: "
+      "time|stop|low_battery|target_reached, do: land|hold|return|resume|go_to");
+    f("operator", operator_link, "the radio between operator and vehicle");
     f("semantics", semantics, "what the mapped cloud shows");
     f("scoring", scoring, "what the truth is compared with");
     f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
                 !devices.contains("mocap"),
             "devices with other names than imu, lidar, depth and mocap, which the first ones have");
+    f.check(
+        stack.mapping.enabled || std::none_of(commands.begin(), commands.end(), needs_a_planner),
+        "mapping.enabled true, or commands without return and go_to, which are planned ways");
     f.check(lidar.enabled || stack.odometry.source == "mocap",
             "lidar.enabled true, or odometry.source mocap");
     // Software that takes longer than the time between two frames falls ever further behind.
@@ -105,6 +115,10 @@ struct ScenarioConfig {
             "mapping.depth_rate_hz), further devices counted");
   }
 
+  static bool needs_a_planner(const OperatorOrder& order) {
+    return order.what == OperatorCommand::Kind::kReturn ||
+           order.what == OperatorCommand::Kind::kGoTo;
+  }
   /// Frames that the maps take, of all devices.
   [[nodiscard]] double mapped_frames_hz() const;
 };

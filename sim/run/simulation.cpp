@@ -39,6 +39,7 @@ void ExplorationLog::add(const Decision& decision) {
               decision.previous_end == TargetEnd::kCutOff;
   if (decision.kind == DecisionKind::kNewTarget) {
     ++issued;
+    directed += decision.undirected_winner && decision.undirected_winner != decision.winner;
     exhaustive += decision.source == "exhaustive" || decision.source == "forgiving";
   } else if (decision.kind == DecisionKind::kStop) {
     stop_reason = decision.stop_reason;
@@ -55,6 +56,7 @@ void ExplorationLog::add_figures(Figures& figures) const {
   figures.set("exploration.targets_reached", reached);
   figures.set("exploration.targets_given_up", given_up);
   figures.set("exploration.exhaustive", exhaustive);
+  figures.set("exploration.directed", directed);
   if (stop_reason != StopReason::kNone) {
     figures.set("exploration.stop", kStopReasonNames[static_cast<std::size_t>(stop_reason)]);
   }
@@ -70,7 +72,8 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       previous_truth_(physics_.truth()),
       scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
               ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
-      jobs_(threads) {
+      jobs_(threads),
+      operator_(config_.operator_link, config_.commands, config_.seed) {
   add_devices();
   stack_ = std::make_unique<Stack>(config_.stack, jobs_, config_.seed);
   outlets_.software = stack_.get();
@@ -129,6 +132,7 @@ void Simulation::run_stack() {
                            autopilot_.armed(), autopilot_.state() > AutopilotState::kSpinUp,
                            autopilot_.landed()});
   }
+  for (const OperatorMessage& message : operator_.deliver(now_)) stack_->add_operator(message);
   const auto command = stack_->tick();
   if (!command) return;
   autopilot_.command(*command);
@@ -163,6 +167,7 @@ void Simulation::record() {
       scorer_.target_reached(truth, view);
       exploration_.reached += view.state == MissionState::kExplore;
     }
+    operator_.report(event);
     if (recorder_) recorder_->event(event);
   }
   if (now_ % FlightScorer::kPeriod == 0) {

@@ -35,6 +35,7 @@ struct ExplorationLog {
   int exhaustive = 0;  ///< of these from the exhaustive search, because the trees had none
   int seen = 0;        ///< targets dropped because they were seen on the way
   int given_up = 0;    ///< targets that proved unreachable, or were cut off
+  int directed = 0;    ///< decisions for a target that R alone would not have chosen
   int reached = 0;     ///< targets that the mission said it reached while exploring
   StopReason stop_reason = StopReason::kNone;
   std::optional<double> open_frontier_m2;  ///< see Decision
@@ -144,6 +145,7 @@ class Simulation {
   Outlets outlets_;
   std::vector<std::pair<std::string, std::unique_ptr<Device>>> devices_;  ///< fired in this order
   std::unique_ptr<FlightSoftware> stack_;
+  OperatorLink operator_;
 };
 
 }  // namespace arex::sim

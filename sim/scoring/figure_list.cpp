@@ -93,6 +93,8 @@ std::vector<FigureInfo> exploration_figures() {
        "both"},
       {"exploration.exhaustive", "targets of the exhaustive search", "", kNeither, false,
        "of the issued, those that the trees did not have"},
+      {"exploration.directed", "decided by the direction", "", kNeither, false,
+       "of the targets issued, those that R alone, without f_D and case C, would not have chosen"},
       {"exploration.stop", "why the exploration stopped", "", kNeither, true,
        "null: it did not stop by itself", Kind::kText},
       {"exploration.open_frontier_m2", "largest frontier left", "m^2", kLess, false,

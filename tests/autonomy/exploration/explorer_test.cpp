@@ -164,6 +164,17 @@ TEST(Explorer, TheExhaustiveSearchHasTheLastWord) {
   EXPECT_GT(flight.targets.size(), 2u);
 }
 
+TEST(Explorer, AsPrintedTheTreesWordEndsIt) {
+  ExplorerConfig config = light();
+  config.stop.exhaustive = false;
+  config.detector.local_iterations = 0;
+  config.detector.global_iterations = 0;
+  const Flight flight = explore(2, config);
+  EXPECT_EQ(flight.last.stop_reason, StopReason::kNoCandidates);
+  EXPECT_TRUE(flight.targets.empty());
+  EXPECT_GT(flight.last.open_frontier_m2, 1);  // and says what it left
+}
+
 /// A free hall whose far end is unknown.
 struct Hall {
   OccupancyMap2D map = test::make_map(200, 80, OccupancyMap2D::kUnknown);

@@ -99,6 +99,9 @@ TEST(Revenue, DirectionAwarePrefersStraightOn) {
       evaluate_revenue(c, config);
     }
     EXPECT_EQ(best_candidate(candidates), aware ? 1u : 0u);
+    if (aware) {
+      EXPECT_EQ(best_undirected(candidates), 0u);
+    }
   }
   candidates[1].verdict = Verdict::kNearObstacle;
   EXPECT_EQ(best_candidate(candidates), 2u);

@@ -273,13 +273,16 @@ std::set<Voxel> offsets_of(double lambda_m, InflationShape shape) {
 
 TEST(Inflation, HasThePapersOffsetsAndTheSpheres) {
   for (const double lambda : {0.0, 0.1, 0.25, 0.3, 0.5, 0.6, 0.7, 0.75, 1.1}) {
-    std::set<Voxel> cube, sphere;
+    std::set<Voxel> cube, sphere, octant;
     const int n = static_cast<int>(std::ceil(lambda / kResolution - 1e-9));
     // The paper's points P - lambda + size * (a, b, c), with a, b, c in 0..2n: for a lambda on the
     // grid the cells -n..n about the point's own.
     for (int a = 0; a <= 2 * n; ++a) {
       for (int b = 0; b <= 2 * n; ++b) {
-        for (int c = 0; c <= 2 * n; ++c) cube.insert({a - n, b - n, c - n});
+        for (int c = 0; c <= 2 * n; ++c) {
+          cube.insert({a - n, b - n, c - n});
+          if (std::max({a, b, c}) <= n) octant.insert({a - n, b - n, c - n});  // as printed
+        }
       }
     }
     for (const Voxel& v : cube) {
@@ -287,15 +290,17 @@ TEST(Inflation, HasThePapersOffsetsAndTheSpheres) {
       if (r <= lambda + 1e-6) sphere.insert(v);
     }
     EXPECT_EQ(offsets_of(lambda, InflationShape::kCubic), cube) << lambda;
+    EXPECT_EQ(offsets_of(lambda, InflationShape::kPrinted), octant) << lambda;
     EXPECT_EQ(offsets_of(lambda, InflationShape::kSpherical), sphere) << lambda;
   }
 }
 
 TEST(Inflation, AgreesWithBruteForceOnRandomGrids) {
   for (const int length : {64, 100, 127, 130}) {
-    for (const InflationShape shape : {InflationShape::kCubic, InflationShape::kSpherical}) {
+    for (const InflationShape shape :
+         {InflationShape::kCubic, InflationShape::kSpherical, InflationShape::kPrinted}) {
       std::mt19937_64 random(static_cast<unsigned>(length));
-      const double lambda = shape == InflationShape::kCubic ? 0.4 : 0.5;
+      const double lambda = shape == InflationShape::kSpherical ? 0.5 : 0.4;
       BitGrid occupied(23, 9, length);
       BitGrid inflated = occupied;
       std::vector<Voxel> obstacles;

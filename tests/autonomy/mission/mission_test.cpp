@@ -15,6 +15,7 @@ class Pilot {
   explicit Pilot(const MissionConfig& config)
       : mission(config, [this](EventKind kind, const std::string& detail) {
           if (kind == EventKind::kMissionState) states.push_back(detail);
+          if (kind == EventKind::kOperator) answers.push_back(detail);
           if (kind == EventKind::kRecovery || kind == EventKind::kStuck) troubles.push_back(detail);
         }) {}
 
@@ -35,6 +36,8 @@ class Pilot {
     inputs.progress = navigates ? progress : MotionProgress::kUnderWay;
     inputs.cause = "no_path";
     inputs.below = below;
+    inputs.at_reserve = at_reserve;
+    if (heartbeat && now % kNanosecondsPerSecond == 0) mission.hear({}, now);
     if (mission.landing_query()) {
       queries.push_back(*mission.landing_query());
       mission.answer(places.empty() ? std::nullopt : std::optional(places.front()));
@@ -46,11 +49,14 @@ class Pilot {
     if (request.kind == MotionRequest::Kind::kLand) {
       landed_at = p_O.head<2>();
       armed = false;
-    } else if (progress != MotionProgress::kFailed) {
+    } else if (progress != MotionProgress::kFailed && request.kind != MotionRequest::Kind::kHold) {
       p_O = request.goal_O;
     }
   }
 
+  void ask(OperatorCommand::Kind kind, const Vec3& goal_O = Vec3::Zero()) {
+    mission.hear({OperatorCommand{kind, goal_O}}, now);
+  }
   void decide(const Decision& decision) { mission.decide(decision); }
 
   Stamp now = 0;
@@ -62,14 +68,17 @@ class Pilot {
   LandingGround below = LandingGround::kClear;  ///< where it would come down
   std::vector<LandingPlace> places;             ///< answers, in order
   std::vector<LandingQuery> queries;
-  std::vector<std::string> states, troubles;
+  bool at_reserve = false;  ///< of the battery
+  bool heartbeat = false;   ///< of the operator
+  std::vector<std::string> states, troubles, answers;
   Mission mission;
 };
 
 MissionConfig exploration(bool land_at_start) {
   MissionConfig config;
   config.kind = MissionConfig::Kind::kExplore;
-  config.land_at_start = land_at_start;
+  using LandAtStart = MissionConfig::LandAtStart;
+  config.land_at_start = land_at_start ? LandAtStart::kTrue : LandAtStart::kFalse;
   config.entry_m = {{5, 0, 1.5}};
   return config;
 }
@@ -363,6 +372,152 @@ TEST(Mission, AnExplorerThatNeverSpeaksIsNotWaitedForForEver) {
   desk.run(200, pilot_until(50));
   EXPECT_EQ(desk.mission.stuck(), "no_map");
   EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+}
+
+using Ask = OperatorCommand::Kind;
+
+/// Exploring, at (20, 3) with a target further on that it does not reach by itself.
+void fly_out(Pilot& pilot) {
+  pilot.fly(10);
+  pilot.decide(target({20, 3, 1.5}, 7));
+  pilot.fly(1);
+  pilot.progress = MotionProgress::kUnderWay;
+  pilot.decide(target({40, 3, 1.5}, 8));
+  pilot.fly(0.1);
+  pilot.p_O = {23, 3, 1.5};
+}
+
+TEST(MissionOperator, LandsWhereItIsOrOnTheNearestClearPlace) {
+  for (const bool clear : {true, false}) {
+    Pilot pilot(exploration(true));
+    pilot.places = {{PlaceKind::kClear, {24, 5, 1.5}}};
+    fly_out(pilot);
+    pilot.below = clear ? LandingGround::kClear : LandingGround::kObstructed;
+    pilot.ask(Ask::kLand);
+    pilot.progress = MotionProgress::kArrived;
+    pilot.fly(0.3);
+    EXPECT_EQ(pilot.mission.state(), MissionState::kHold);  // it comes to rest first
+    const Vec2 place(pilot.p_O.x(), 3);
+    while (pilot.mission.state() == MissionState::kHold) pilot.step();
+    pilot.below = LandingGround::kClear;
+    pilot.fly(3);
+    EXPECT_EQ(pilot.mission.state(), MissionState::kDone);
+    EXPECT_EQ(pilot.landed_at, clear ? place : Vec2(24, 5));
+    EXPECT_EQ(pilot.answers, std::vector<std::string>{"land"});
+    EXPECT_EQ(pilot.mission.stuck(), "");
+  }
+}
+
+TEST(MissionOperator, HoldsAndGoesOnWithTheSameTarget) {
+  Pilot pilot(exploration(true));
+  fly_out(pilot);
+  const MotionRequest before = pilot.request;
+  pilot.ask(Ask::kHold);
+  pilot.fly(100);
+  EXPECT_EQ(pilot.request.kind, MotionRequest::Kind::kHold);
+  pilot.ask(Ask::kResume);
+  pilot.fly(0.1);
+  EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);
+  EXPECT_EQ(pilot.request, before);
+  EXPECT_EQ(pilot.mission.target_progress(), TargetProgress::kUnderWay);
+}
+
+TEST(MissionOperator, FliesHomeOrToAPlace) {
+  Pilot home(exploration(false));
+  fly_out(home);
+  home.ask(Ask::kReturn);
+  home.progress = MotionProgress::kArrived;
+  home.fly(3);
+  EXPECT_EQ(home.landed_at, Vec2(0, 0));
+
+  Pilot there(exploration(false));
+  fly_out(there);
+  there.ask(Ask::kGoTo, {7, 8, 2});
+  there.progress = MotionProgress::kArrived;
+  there.fly(5);
+  EXPECT_EQ(there.p_O, Vec3(7, 8, 2));
+  EXPECT_EQ(there.request.kind, MotionRequest::Kind::kHold);
+  // A place that cannot be reached is told, and it holds.
+  there.progress = MotionProgress::kFailed;
+  there.ask(Ask::kGoTo, {9, 9, 2});
+  there.fly(5);
+  EXPECT_EQ(there.request.kind, MotionRequest::Kind::kHold);
+  EXPECT_EQ(there.troubles, std::vector<std::string>{"no_path"});
+  EXPECT_TRUE(there.mission.stuck().empty());
+}
+
+TEST(MissionOperator, WhatCannotBeDoneIsRefused) {
+  Pilot pilot(exploration(true));
+  pilot.heartbeat = true;
+  pilot.fly(1);
+  pilot.ask(Ask::kLand);
+  pilot.fly(9);
+  pilot.ask(Ask::kResume);
+  pilot.fly(0.1);
+  EXPECT_EQ(pilot.answers, (std::vector<std::string>{"land refused in state initialise",
+                                                     "resume refused in state explore"}));
+  EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);
+}
+
+TEST(MissionOperator, ALostLinkIsAnsweredAsConfigured) {
+  using Lost = LinkConfig::Lost;
+  for (const Lost lost : {Lost::kContinue, Lost::kReturn, Lost::kLand}) {
+    MissionConfig config = exploration(false);
+    config.link.lost = lost;
+    Pilot pilot(config);
+    pilot.heartbeat = true;
+    fly_out(pilot);
+    pilot.fly(8);
+    EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);  // the link is there
+    pilot.heartbeat = false;
+    pilot.fly(3.9);
+    EXPECT_EQ(pilot.mission.state(), MissionState::kExplore);
+    pilot.progress = lost == Lost::kContinue ? pilot.progress : MotionProgress::kArrived;
+    pilot.fly(6);
+    const bool lands = lost != Lost::kContinue;
+    EXPECT_EQ(pilot.mission.state(), lands ? MissionState::kDone : MissionState::kExplore);
+    if (lands) {
+      EXPECT_EQ(pilot.landed_at.x(), lost == Lost::kReturn ? 0 : 40);
+    }
+    ASSERT_EQ(pilot.answers.size(), lands ? 2U : 1U);
+    pilot.heartbeat = true;
+    pilot.fly(2);
+    EXPECT_EQ(pilot.answers.back(), "link is back");
+  }
+  // Whom nobody was ever heard by misses nobody.
+  MissionConfig config = exploration(false);
+  config.link.lost = Lost::kLand;
+  Pilot alone(config);
+  fly_out(alone);
+  alone.fly(15);
+  EXPECT_EQ(alone.mission.state(), MissionState::kExplore);
+}
+
+TEST(Mission, RemainsInTheAirUntilTheReserve) {
+  MissionConfig config = exploration(true);
+  config.remain_at_end = true;
+  Pilot pilot(config);
+  explore(pilot, stop());
+  pilot.fly(200);
+  EXPECT_EQ(pilot.request.kind, MotionRequest::Kind::kHold);
+  pilot.at_reserve = true;
+  pilot.fly(2);
+  EXPECT_EQ(pilot.landed_at, Vec2(20, 3));
+  EXPECT_TRUE(pilot.mission.stuck().empty());
+}
+
+TEST(Mission, ComesHomeWhereThatIsInReach) {
+  for (const double left_wh : {30., 20.}) {
+    MissionConfig config = exploration(false);
+    config.land_at_start = MissionConfig::LandAtStart::kIfInReach;
+    Pilot pilot(config);
+    pilot.places = {{PlaceKind::kClear, {22, 4, 1.5}}};
+    Decision last = stop();
+    last.energy = {left_wh, 1, 10, 12};  // left, needed to land, reserve, needed to come home
+    explore(pilot, last);
+    pilot.fly(2);
+    EXPECT_EQ(pilot.landed_at, left_wh > 22 ? Vec2(0, 0) : Vec2(22, 4));
+  }
 }
 
 }  // namespace

@@ -396,6 +396,26 @@ TEST(ReplanMachine, FollowsAGuideAroundWhatTheGridDoesNotShow) {
   EXPECT_LT(nearest_corner, 4.0);
 }
 
+TEST(ReplanMachine, AsPrintedItFliesStraightAndTurnsTowardsTheTargetAtOnce) {
+  const test::TestGrid grid(300, 300, 30, 0.1, {-15, -15, 0});
+  YawConfig yaw;
+  yaw.mode = YawMode::kTowardsTarget;
+  ReplanMachine machine(ReplanConfig(), LocalPlannerConfig(), yaw, 1);
+  const Vec3 start(10, 10, 1.5), target(-10, -10, 1.5);  // behind: heading is +x
+  Flight flight(machine, start);
+  flight.step(grid.view());
+  machine.set_target(target, {}, flight.now_);
+  const Vec3 way = (target - start).normalized();
+  for (int i = 0; i < 6000 && machine.has_target(); ++i) {
+    const Vec3 before = flight.last_.p_OB;
+    flight.step(grid.view());
+    EXPECT_LT((before - start).cross(way).norm(), 0.1);
+    if ((target - before).norm() < 0.5) continue;
+    EXPECT_NEAR(so3::wrap(flight.last_.yaw_rad - std::atan2(-1, -1)), 0, 0.1);
+  }
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+}
+
 TEST(ReplanMachine, LooksBeforeItFliesAndNeverOutrunsWhatItKnows) {
   test::TestGrid grid(160, 80, 20);
   grid.forget({0, 0, 0}, {159, 79, 19});

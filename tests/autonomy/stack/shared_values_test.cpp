@@ -39,7 +39,7 @@ TEST(SharedValues, OneRadiusOneSensorModelOneWayHomeOneCaution) {
   StackConfig config;
   config.vehicle.radius_m = 0.4;
   config.mapping.local.sensor.hit_probability = 0.8;
-  config.mission.land_at_start = false;
+  config.mission.land_at_start = MissionConfig::LandAtStart::kFalse;
   config.caution.degenerate_speed_fraction = 0.25;
   config.planning.local.max_speed_mps = 1.6;
   const StackConfig shared = with_shared_values(config);

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -133,6 +135,11 @@ TEST(FiguresOfAFlight, TargetsAgreeWithDecisionsAndEvents) {
   const ordered_json& exploration = flown.summary["exploration"];
   // A decision has a row for each candidate.
   std::set<std::string> issued, seen, given_up;
+  struct Best {
+    double revenue = -1e300;
+    bool won = false;
+  };
+  std::map<std::string, Best> by_r;  // the candidate with the largest R = R_d + f_D
   for (std::size_t i = 0; i < flown.decisions.rows.size(); ++i) {
     const std::string number = flown.decisions.text(i, "decision");
     const std::string end = flown.decisions.text(i, "previous_end");
@@ -140,12 +147,21 @@ TEST(FiguresOfAFlight, TargetsAgreeWithDecisionsAndEvents) {
     if (end == "seen") seen.insert(number);
     if (end == "unreachable" || end == "cut_off") given_up.insert(number);
     const std::string verdict = flown.decisions.text(i, "verdict");
+    if (flown.decisions.text(i, "kind") == "new_target" &&
+        flown.decisions.text(i, "revenue") != "") {
+      const double r = std::stod(flown.decisions.text(i, "revenue")) +
+                       std::stod(flown.decisions.text(i, "direction"));
+      Best& best = by_r[number];
+      if (r > best.revenue) best = {r, flown.decisions.text(i, "winner") == "1"};
+    }
     if (verdict != "kept" && verdict != "off_direction") {
       EXPECT_EQ(flown.decisions.text(i, "revenue"), "") << number;
     }
   }
   EXPECT_GT(issued.size(), 3U);
   EXPECT_EQ(exploration["targets_issued"], issued.size());
+  EXPECT_EQ(exploration["directed"],
+            std::count_if(by_r.begin(), by_r.end(), [](const auto& d) { return !d.second.won; }));
   EXPECT_EQ(exploration["targets_seen"], seen.size());
   EXPECT_EQ(exploration["targets_given_up"], given_up.size());
   // It comes home: one more than it explored.

@@ -17,8 +17,11 @@ using test::write_text;
 
 std::vector<std::filesystem::path> shipped_scenarios() {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios")) {
-    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  for (const char* folder : {"/scenarios", "/scenarios/paper"}) {
+    for (const auto& entry :
+         std::filesystem::directory_iterator(std::string(AREX_SOURCE_DIR) + folder)) {
+      if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+    }
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -33,6 +36,17 @@ TEST(Scenario, EveryShippedFileIsValidAndSurvivesItsResolvedForm) {
     const Scenario again = load_scenario(folder / "resolved.yaml", {}, {});
     EXPECT_EQ(again.resolved_yaml(), scenario.resolved_yaml()) << file;
     EXPECT_EQ(again.config.seed, 7u);
+  }
+}
+
+TEST(Scenario, ASweepIsToldFromOne) {
+  const std::string file = AREX_SOURCE_DIR "/scenarios/sweeps/lambda.yaml";
+  try {
+    static_cast<void>(load_scenario(file, {}, {}));
+    ADD_FAILURE() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(std::string(error.what()).find(file + ":3: 'base' makes this a sweep"), 0U)
+        << error.what();
   }
 }
 

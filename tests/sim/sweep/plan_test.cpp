@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
 #include <set>
 
@@ -290,6 +291,13 @@ TEST_F(PlanTest, SweepsThatNobodyCanFlyAreRefusedAtOnce) {
             "2^53");
 }
 
+TEST(ShippedSweeps, AreValid) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios/sweeps")) {
+    EXPECT_GT(expand(load_sweep_file(entry.path()), "build").runs.size(), 1u) << entry.path();
+  }
+}
+
 TEST(ShippedSweeps, ExpandToWhatTheirCommentsSay) {
   const auto runs = [](const std::string& name) {
     return expand(load_sweep_file(AREX_SOURCE_DIR "/scenarios/sweeps/" + name + ".yaml"), "build")
@@ -301,6 +309,7 @@ TEST(ShippedSweeps, ExpandToWhatTheirCommentsSay) {
   EXPECT_EQ(runs("odometry"), 10u);
   EXPECT_EQ(runs("explore"), 20u);
   EXPECT_EQ(runs("direction"), 80u);
+  EXPECT_EQ(runs("printed"), 480u);
 }
 
 }  // namespace

@@ -20,7 +20,9 @@ struct RunArguments {
   ScenarioArguments scenario;
   std::string out;                        ///< empty: see RunFolder::first_free
   std::string name;                       ///< of the scenario, in the summary; empty: the file's
-  std::string bag;                        ///< ROS 1 bag to write; empty: none
+  std::string bag;                        ///< ROS 1 bag or MCAP to write; empty: none
+  std::string bag_layout = "generic";     ///< see BagLayout
+  std::string bag_compression = "none";   ///< or lz4
   std::vector<std::string> requirements;  ///< of the summary: field>=value
   std::string junit;                      ///< JUnit file to write; empty: none
   int threads = 0;                        ///< 0: one a core, four at most

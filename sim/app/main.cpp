@@ -39,7 +39,17 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
   add_scenario_options(*command, arguments.scenario, true);
   command->add_option("--out", arguments.out, "run folder; default runs/SCENARIO-seedN");
   command->add_option("--name", arguments.name, "the scenario's name; default the file's");
-  command->add_option("--bag", arguments.bag, "also write the sensors' data as a ROS 1 bag");
+  command->add_option(
+      "--bag", arguments.bag,
+      "also write the sensors' data: FILE.mcap as MCAP with ROS 2 messages, else a ROS 1 bag");
+  command
+      ->add_option("--bag-layout", arguments.bag_layout,
+                   "of its LiDAR points: generic, livox_driver2, livox_custom or livox_custom2")
+      ->check(CLI::IsMember({"generic", "livox_driver2", "livox_custom", "livox_custom2"}))
+      ->capture_default_str();
+  command->add_option("--bag-compression", arguments.bag_compression, "of its chunks: none or lz4")
+      ->check(CLI::IsMember({"none", "lz4"}))
+      ->capture_default_str();
   command
       ->add_option("--require", arguments.requirements,
                    "field>=value of the summary, else exit code 1; may be repeated")

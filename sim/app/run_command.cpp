@@ -95,6 +95,15 @@ void check_outputs(const RunArguments& arguments, const std::filesystem::path& f
   sim::expect_different_files(files);
 }
 
+sim::BagOptions bag_options(const RunArguments& arguments, const sim::Scenario& scenario) {
+  const auto named =
+      std::find(sim::kBagLayoutNames.begin(), sim::kBagLayoutNames.end(), arguments.bag_layout);
+  return {
+      static_cast<sim::BagLayout>(named - sim::kBagLayoutNames.begin()),
+      arguments.bag_compression == "lz4" ? sim::BagCompression::kLz4 : sim::BagCompression::kNone,
+      scenario.config.lidar.model.misses_in_bag};
+}
+
 /// What a flight leaves: the run folder and, if asked for, a bag. A file that the disk refuses does
 /// not keep the others from being written.
 class Outputs {
@@ -102,7 +111,9 @@ class Outputs {
   /// @throws DiskError if one of them cannot be begun.
   void begin(const RunArguments& arguments, const sim::Scenario& scenario,
              const std::filesystem::path& folder, sim::Simulation& simulation) {
-    if (!arguments.bag.empty()) bag_.emplace(arguments.bag, scenario.config.stack.vehicle);
+    if (!arguments.bag.empty()) {
+      bag_.emplace(arguments.bag, scenario.config.stack.vehicle, bag_options(arguments, scenario));
+    }
     recorder_.emplace(folder, scenario.resolved_yaml());
     simulation.record_to(*recorder_);
     if (bag_) simulation.record_to(*bag_);

@@ -1,11 +1,16 @@
 #include "bag/bag_writer.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "bag/mcap_file.h"
+#include "bag/ros_bag.h"
 
 namespace arex::sim {
 namespace {
@@ -13,6 +18,7 @@ namespace {
 constexpr const char* kOdomFrame = "odom";
 constexpr const char* kBodyFrame = "base_link";
 constexpr const char* kScans = "/livox/lidar";
+constexpr const char* kFrameEnds = "/livox/frame_end";
 constexpr const char* kDepths = "/camera/depth";
 constexpr const char* kCameraInfos = "/camera/camera_info";
 
@@ -24,45 +30,87 @@ std::string camera_frame(const std::string& device) {
 }
 
 /// sensor_msgs/PointField's datatypes.
-enum class FieldType : std::uint8_t { kUint8 = 2, kUint32 = 6, kFloat32 = 7 };
+enum class FieldType : std::uint8_t { kUint8 = 2, kUint32 = 6, kFloat32 = 7, kFloat64 = 8 };
 
 struct PointFieldRow {
   std::string_view name;
   std::uint32_t offset;
   FieldType type;
 };
-constexpr std::array<PointFieldRow, 7> kPointFields{{{"x", 0, FieldType::kFloat32},
-                                                     {"y", 4, FieldType::kFloat32},
-                                                     {"z", 8, FieldType::kFloat32},
-                                                     {"intensity", 12, FieldType::kFloat32},
-                                                     {"offset_time", 16, FieldType::kUint32},
-                                                     {"line", 20, FieldType::kUint8},
-                                                     {"tag", 21, FieldType::kUint8}}};
-constexpr std::uint32_t kPointStep = 22;
+constexpr std::array<PointFieldRow, 7> kGenericFields{{{"x", 0, FieldType::kFloat32},
+                                                       {"y", 4, FieldType::kFloat32},
+                                                       {"z", 8, FieldType::kFloat32},
+                                                       {"intensity", 12, FieldType::kFloat32},
+                                                       {"t", 16, FieldType::kUint32},
+                                                       {"ring", 20, FieldType::kUint8},
+                                                       {"tag", 21, FieldType::kUint8}}};
+constexpr std::uint32_t kGenericStep = 22;
+constexpr std::array<PointFieldRow, 7> kDriver2Fields{{{"x", 0, FieldType::kFloat32},
+                                                       {"y", 4, FieldType::kFloat32},
+                                                       {"z", 8, FieldType::kFloat32},
+                                                       {"intensity", 12, FieldType::kFloat32},
+                                                       {"tag", 16, FieldType::kUint8},
+                                                       {"line", 17, FieldType::kUint8},
+                                                       {"timestamp", 18, FieldType::kFloat64}}};
+constexpr std::uint32_t kDriver2Step = 26;
 
-void put_numbers(RosBytes& out, std::span<const double> values) {
-  out.put_raw(values.data(), values.size_bytes());
+constexpr double kTeslaPerGauss = 1e-4;
+
+/// The scan with its firings that returned nothing: at the origin, as the driver writes them.
+std::vector<LidarPoint> every_firing(const LidarScan& scan) {
+  if (scan.packets_ns.empty()) return scan.points;
+  std::vector<LidarPoint> all(static_cast<std::size_t>(scan.firings()));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto firing = static_cast<std::int64_t>(i);
+    all[i].offset_ns = scan.firing_ns(firing);
+    all[i].line = static_cast<std::uint8_t>(firing % LidarScan::kLines);
+  }
+  for (const LidarPoint& point : scan.points) all[point.firing] = point;
+  return all;
 }
 
 /// A 3x3 (9 values) or 6x6 (36 values) covariance of zeros but for its first value.
 template <std::size_t size>
-void put_covariance(RosBytes& out, double first = 0) {
-  put_numbers(out, std::array<double, size>{first});
+std::array<double, size> covariance(double first = 0) {
+  return {first};
+}
+
+std::unique_ptr<MessageFile> file_for(const std::filesystem::path& path,
+                                      BagCompression compression) {
+  if (path.extension() == ".mcap") return std::make_unique<McapFile>(path, compression);
+  return std::make_unique<RosBag>(path, compression);
 }
 
 }  // namespace
 
 BagWriter::BagWriter(const std::filesystem::path& path, const VehicleConfig& vehicle,
-                     BagCompression compression)
-    : bag_(path, compression),
+                     const BagOptions& options)
+    : file_(file_for(path, options.compression)),
+      options_(options),
       imu_(topic("/imu/data", imu_type())),
+      livox_imu_(topic("/livox/imu", imu_type())),
+      field_(topic("/imu/mag", magnetic_field_type())),
       truth_(topic("/truth", odometry_type())),
-      static_transforms_(topic("/tf_static", tf_type(), true)) {
-  // Every bag has them, in this order.
-  topic_of("", kScans, "", point_cloud_type());
+      transforms_(topic("/tf", tf_type())),
+      static_transforms_(topic("/tf_static", tf_type(), true)),
+      message_(file_->format()) {
+  // Those of the first devices come first, in this order.
+  topic_of("", kScans, "", scan_type());
+  topic_of("", kFrameEnds, "", time_reference_type());
   topic_of("", kDepths, "", image_type());
   topic_of("", kCameraInfos, "", camera_info_type());
   static_transforms(vehicle);
+}
+
+RosMessageType BagWriter::scan_type() const {
+  switch (options_.layout) {
+    case BagLayout::kLivoxCustom:
+      return livox_custom_type();
+    case BagLayout::kLivoxCustom2:
+      return livox_custom2_type();
+    default:
+      return point_cloud_type();
+  }
 }
 
 BagWriter::Topic& BagWriter::topic_of(const std::string& device, const char* first,
@@ -75,67 +123,166 @@ BagWriter::Topic& BagWriter::topic_of(const std::string& device, const char* fir
 
 BagWriter::Topic BagWriter::topic(const std::string& name, const RosMessageType& type,
                                   bool latched) {
-  return {bag_.add_topic(name, type, latched), 0};
+  return {file_->add_topic(name, type, latched), 0};
 }
 
-void BagWriter::begin(Topic& topic, Stamp stamp, const std::string& frame) {
+void BagWriter::begin_message(Topic& topic, Stamp stamp, const std::string& frame) {
   message_.clear();
-  message_.put(topic.sequence++);
+  put_header(topic, stamp, frame);
+}
+
+void BagWriter::put_header(Topic& topic, Stamp stamp, const std::string& frame) {
+  if (file_->format() == WireFormat::kRos1) message_.put(topic.sequence++);
   message_.put(ros_time(stamp));
   message_.put(frame);
 }
 
-void BagWriter::imu(const ImuSample& sample) {
-  begin(imu_, sample.stamp, kBodyFrame);
+void BagWriter::put_numbers(std::span<const double> values) {
+  message_.align(sizeof(double));
+  message_.put_raw(values.data(), values.size_bytes());
+}
+
+void BagWriter::imu_on(Topic& topic, const ImuSample& sample) {
+  begin_message(topic, sample.stamp, kBodyFrame);
   message_.put(Quat::Identity());
-  put_covariance<9>(message_, -1);  // sensor_msgs/Imu: -1 where there is no estimate
+  put_numbers(covariance<9>(-1));  // sensor_msgs/Imu: -1 where there is no estimate
   message_.put(sample.gyro_radps);
-  put_covariance<9>(message_);
+  put_numbers(covariance<9>());
   message_.put(sample.accel_mps2);
-  put_covariance<9>(message_);
-  bag_.write(imu_.connection, ros_time(sample.stamp), message_);
+  put_numbers(covariance<9>());
+  write(topic);
+}
+
+void BagWriter::imu(const ImuSample& sample) {
+  if (sample.stamp < 0) return;  // its clock lags, and the run has just begun
+  imu_on(imu_, sample);
+  imu_on(livox_imu_, sample);
+  begin_message(field_, sample.stamp, kBodyFrame);
+  message_.put(kTeslaPerGauss * sample.field_gauss);
+  put_numbers(covariance<9>());
+  write(field_);
+}
+
+void BagWriter::put_point(const LidarPoint& point, Stamp frame_begin) {
+  message_.put_raw(point.p_L.data(), 3 * sizeof(float));
+  message_.put_packed(point.intensity);
+  if (options_.layout == BagLayout::kLivoxDriver2) {
+    message_.put_packed(point.tag);
+    message_.put_packed(point.line);
+    message_.put_packed(static_cast<double>(frame_begin + point.offset_ns));
+  } else {
+    message_.put_packed(point.offset_ns);
+    message_.put_packed(point.line);
+    message_.put_packed(point.tag);
+  }
+}
+
+void BagWriter::frame_end(const LidarScan& scan) {
+  Topic& topic = topic_of(scan.device, kFrameEnds, "/frame_end", time_reference_type());
+  begin_message(topic, scan.stamp, lidar_frame(scan.device));
+  message_.put(ros_time(scan.end));
+  message_.put("frame_end");
+  write(topic);
 }
 
 void BagWriter::scan(const LidarScan& scan) {
-  Topic& topic = topic_of(scan.device, kScans, "/points", point_cloud_type());
-  begin(topic, scan.stamp, lidar_frame(scan.device));
-  const auto count = static_cast<std::uint32_t>(scan.points.size());
+  frame_end(scan);
+  const std::vector<LidarPoint> every =
+      options_.lidar_misses ? every_firing(scan) : std::vector<LidarPoint>{};
+  const std::vector<LidarPoint>& points = options_.lidar_misses ? every : scan.points;
+  Topic& topic = topic_of(scan.device, kScans, "/points", scan_type());
+  begin_message(topic, scan.stamp, lidar_frame(scan.device));
+  const bool is_custom =
+      options_.layout == BagLayout::kLivoxCustom || options_.layout == BagLayout::kLivoxCustom2;
+  if (is_custom) {
+    custom(scan, points);
+  } else {
+    cloud(scan, points);
+  }
+  write(topic);
+}
+
+void BagWriter::cloud(const LidarScan& scan, const std::vector<LidarPoint>& points) {
+  const bool driver2 = options_.layout == BagLayout::kLivoxDriver2;
+  const auto& fields = driver2 ? kDriver2Fields : kGenericFields;
+  const std::uint32_t step = driver2 ? kDriver2Step : kGenericStep;
+  const auto count = static_cast<std::uint32_t>(points.size());
   message_.put(std::uint32_t{1});  // height: an unordered cloud
   message_.put(count);
-  message_.put_length(kPointFields.size());
-  for (const PointFieldRow& field : kPointFields) {
+  message_.put_length(fields.size());
+  for (const PointFieldRow& field : fields) {
     message_.put(field.name);
     message_.put(field.offset);
     message_.put(static_cast<std::uint8_t>(field.type));
     message_.put(std::uint32_t{1});
   }
   message_.put(false);  // is_bigendian
-  message_.put(kPointStep);
-  message_.put(kPointStep * count);
-  message_.put_length(kPointStep * scan.points.size());
-  message_.reserve(message_.size() + kPointStep * scan.points.size() + 1);
-  for (const LidarPoint& point : scan.points) {
-    message_.put_raw(point.p_L.data(), 3 * sizeof(float));
-    message_.put(point.intensity);
-    message_.put(point.offset_ns);
-    message_.put(point.line);
-    message_.put(point.tag);
-  }
+  message_.put(step);
+  message_.put(step * count);
+  message_.put_length(step * points.size());
+  message_.reserve(message_.size() + step * points.size() + 1);
+  for (const LidarPoint& point : points) put_point(point, scan.stamp);
   message_.put(true);  // is_dense
-  bag_.write(topic.connection, ros_time(scan.end), message_);
 }
 
-void BagWriter::truth(Stamp stamp, const Pose& X_OB, const Vec3& v_OB, const Vec3& w_OB_B) {
-  begin(truth_, stamp, kOdomFrame);
-  message_.put(kBodyFrame);
-  message_.put(X_OB.p);
-  message_.put(X_OB.quaternion());
-  put_covariance<36>(message_);
-  const Vec3 v_OB_B = X_OB.R.transpose() * v_OB;
-  message_.put(v_OB_B);
-  message_.put(w_OB_B);
-  put_covariance<36>(message_);
-  bag_.write(truth_.connection, ros_time(stamp), message_);
+void BagWriter::custom(const LidarScan& scan, const std::vector<LidarPoint>& points) {
+  message_.put(static_cast<std::uint64_t>(scan.stamp));  // timebase
+  message_.put(static_cast<std::uint32_t>(points.size()));
+  for (int i = 0; i < 4; ++i) message_.put(std::uint8_t{0});  // LiDAR's number, reserved
+  message_.put_length(points.size());
+  for (const LidarPoint& point : points) {
+    message_.put(point.offset_ns);
+    message_.put_raw(point.p_L.data(), 3 * sizeof(float));
+    message_.put(static_cast<std::uint8_t>(std::clamp(point.intensity, 0.0F, 255.0F)));
+    message_.put(point.tag);
+    message_.put(point.line);
+  }
+}
+
+void BagWriter::place_odom(const Pose& X_WO, bool has_begun) {
+  X_WO_ = X_WO;
+  odom_begun_ = has_begun;
+}
+
+void BagWriter::truth(Stamp stamp, const Pose& X_WB, const Vec3& v_WB, const Vec3& w_WB_B) {
+  waiting_.push_back({stamp, X_WB, v_WB, w_WB_B});
+  if (odom_begun_) write_truth();
+}
+
+void BagWriter::write_truth() {
+  const Pose X_OW = X_WO_.inverse();
+  for (const TrueMotion& motion : std::exchange(waiting_, {})) {
+    const Pose X_OB = X_OW * motion.X_WB;
+    begin_message(truth_, motion.stamp, kOdomFrame);
+    message_.put(kBodyFrame);
+    message_.put(X_OB.p);
+    message_.put(X_OB.quaternion());
+    put_numbers(covariance<36>());
+    message_.put(Vec3(motion.X_WB.R.transpose() * motion.v_WB));
+    message_.put(motion.w_WB_B);
+    put_numbers(covariance<36>());
+    file_->write(truth_.connection, ros_time(motion.stamp), message_);
+  }
+}
+
+void BagWriter::close() {
+  write_truth();  // of an odometry that never began
+  file_->close();
+}
+
+void BagWriter::estimate(Stamp stamp, const Pose& X_OB) {
+  message_.clear();
+  message_.put_length(1);
+  put_transform(transforms_, stamp, kOdomFrame, kBodyFrame, X_OB);
+  write(transforms_);
+}
+
+void BagWriter::put_transform(Topic& topic, Stamp stamp, const std::string& parent,
+                              const std::string& child, const Pose& X) {
+  put_header(topic, stamp, parent);
+  message_.put(child);
+  message_.put(X.p);
+  message_.put(X.quaternion());
 }
 
 void BagWriter::depth(const DepthImage& image) {
@@ -148,7 +295,7 @@ void BagWriter::depth(const DepthImage& image) {
   }
   camera_info(image);
   Topic& topic = topic_of(image.device, kDepths, "/depth", image_type());
-  begin(topic, image.stamp, camera_frame(image.device));
+  begin_message(topic, image.stamp, camera_frame(image.device));
   message_.put(height);
   message_.put(width);
   message_.put("32FC1");
@@ -159,25 +306,25 @@ void BagWriter::depth(const DepthImage& image) {
   for (const float z : image.depth_m) {
     message_.put(z > 0 ? z : std::numeric_limits<float>::quiet_NaN());
   }
-  bag_.write(topic.connection, ros_time(image.stamp), message_);
+  write(topic);
 }
 
 void BagWriter::camera_info(const DepthImage& image) {
   const PinholeCamera& c = image.camera;
   Topic& topic = topic_of(image.device, kCameraInfos, "/camera_info", camera_info_type());
-  begin(topic, image.stamp, camera_frame(image.device));
+  begin_message(topic, image.stamp, camera_frame(image.device));
   message_.put(static_cast<std::uint32_t>(c.height));
   message_.put(static_cast<std::uint32_t>(c.width));
   message_.put("plumb_bob");
   message_.put_length(5);
-  put_numbers(message_, std::array<double, 5>{});
-  put_numbers(message_, std::array{c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0});
-  put_numbers(message_, std::array{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0});
-  put_numbers(message_, std::array{c.fx, 0.0, c.cx, 0.0, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
+  put_numbers(std::array<double, 5>{});
+  put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0});
+  put_numbers(std::array{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0});
+  put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
   for (int i = 0; i < 2; ++i) message_.put(std::uint32_t{0});  // binning: none
   for (int i = 0; i < 4; ++i) message_.put(std::uint32_t{0});  // region of interest: all
   message_.put(false);
-  bag_.write(topic.connection, ros_time(image.stamp), message_);
+  write(topic);
 }
 
 void BagWriter::static_transforms(const VehicleConfig& vehicle) {
@@ -190,16 +337,12 @@ void BagWriter::static_transforms(const VehicleConfig& vehicle) {
     mounts.push_back({lidar_frame(name), mount.X_BL()});
     mounts.push_back({camera_frame(name), mount.X_BC()});
   }
-  RosBytes transforms;
-  transforms.put_length(mounts.size());
+  message_.clear();
+  message_.put_length(mounts.size());
   for (const Mount& mount : mounts) {
-    begin(static_transforms_, 0, kBodyFrame);
-    message_.put(mount.frame);
-    message_.put(mount.X_B.p);
-    message_.put(mount.X_B.quaternion());
-    transforms.put_raw(message_.view().data(), message_.size());
+    put_transform(static_transforms_, 0, kBodyFrame, mount.frame, mount.X_B);
   }
-  bag_.write(static_transforms_.connection, ros_time(0), transforms);
+  write(static_transforms_);
 }
 
 }  // namespace arex::sim

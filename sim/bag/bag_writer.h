@@ -1,51 +1,91 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
-#include "bag/ros_bag.h"
+#include "bag/message_file.h"
 #include "messages/sensors.h"
 #include "messages/vehicle.h"
 
 namespace arex::sim {
 
-/// What the vehicle's sensors gave, as a ROS 1 bag on which others can run their own odometry.
+/// How the points of a LiDAR's frame are laid out: as the drivers of others do, whose readers then
+/// take them unchanged.
+enum class BagLayout : std::uint8_t {
+  kGeneric,       ///< PointCloud2, 22 bytes: t (uint32, ns since the stamp), ring, tag
+  kLivoxDriver2,  ///< livox_ros_driver2's PointCloud2, 26 bytes: tag, line, timestamp (float64, ns)
+  kLivoxCustom,   ///< livox_ros_driver's CustomMsg
+  kLivoxCustom2,  ///< livox_ros_driver2's CustomMsg
+};
+/// What people write for them: `--bag-layout`.
+inline constexpr std::array<std::string_view, 4> kBagLayoutNames{"generic", "livox_driver2",
+                                                                 "livox_custom", "livox_custom2"};
+
+struct BagOptions {
+  BagLayout layout = BagLayout::kGeneric;
+  BagCompression compression = BagCompression::kNone;
+  bool lidar_misses = false;  ///< firings without a return are written, too
+};
+
+/// What the vehicle's sensors gave, as a recording on which others can run their own odometry: a
+/// ROS 1 bag, or as FILE.mcap MCAP with the same messages of ROS 2.
 ///
 ///     /imu/data            sensor_msgs/Imu          base_link; no orientation (covariance -1)
-///     /livox/lidar         sensor_msgs/PointCloud2  livox_frame; one message per LiDAR frame
+///     /livox/imu           the same under the name that Livox's driver has
+///     /imu/mag             sensor_msgs/MagneticField base_link, tesla; with every /imu/data
+///     /livox/lidar         see BagLayout            livox_frame; one message per LiDAR frame
+///     /livox/frame_end     sensor_msgs/TimeReference when the frame was closed
 ///     /truth               nav_msgs/Odometry        odom -> base_link, twist in base_link
 ///     /camera/depth        sensor_msgs/Image        camera_depth_optical_frame, 32FC1, metres
 ///     /camera/camera_info  sensor_msgs/CameraInfo   of each depth frame, not distorted
+///     /tf                  tf2_msgs/TFMessage       odom -> base_link as the vehicle estimates it
 ///     /tf_static           tf2_msgs/TFMessage       base_link -> livox_frame and -> camera,
 ///     latched
 ///
-/// odom is O, base_link is B (the IMU), livox_frame is L, camera_depth_optical_frame is C. A point
-/// takes 22 bytes without gaps: x y z intensity as float32 at 0 4 8 12, offset_time (since
-/// header.stamp, ns) as uint32 at 16, line and tag as uint8 at 20 and 21; x y z are in L at the
-/// point's own time. A depth that was not measured is NaN (REP 118).
+/// odom is O, base_link is B (the IMU), livox_frame is L, camera_depth_optical_frame is C. Points
+/// are in L, each at its own time. They stand in firing order, their times run backwards where the
+/// device's packets were stamped so. Firings without a return are left out, or, if asked for, have
+/// their line, their time and zeros, as the driver writes them. A depth that was not measured is
+/// NaN (REP 118).
 ///
 /// Further LiDARs and cameras have topics and frames of their names: /NAME/points in NAME_frame,
 /// /NAME/depth and /NAME/camera_info in NAME_optical_frame.
 ///
-/// header.stamp is the device's own stamp plus one second (ROS knows no time zero); messages are
-/// recorded at that time too, a scan at its end. Covariances are zero: unknown for the IMU, none
-/// for the truth. Errors: see RosBag.
+/// header.stamp is the device's own stamp, zero as one nanosecond (ROS knows no time zero); what a
+/// device stamps before zero is left out. Messages are recorded when they arrive, the truth when it
+/// is so. A frame's end is not the time of its last point: the device closes it by its own clock,
+/// and the vehicle's odometry corrects at that moment. So that a replay does, too, it is written in
+/// time_ref of a message with the frame's stamp before each frame, its source `frame_end`.
+/// Covariances are zero: unknown for the IMU, none for the truth. Errors: see MessageFile.
 class BagWriter {
  public:
   /// @param vehicle whose calibration goes to /tf_static
   BagWriter(const std::filesystem::path& path, const VehicleConfig& vehicle,
-            BagCompression compression = BagCompression::kNone);
+            const BagOptions& options = {});
 
+  /// Sets the clock: what is written from here on arrives at `now`.
+  void begin(Stamp now) { now_ = now; }
+  /// To /imu/data, /livox/imu and /imu/mag.
   void imu(const ImuSample& sample);
   void scan(const LidarScan& scan);
-  /// @param X_OB, v_OB, w_OB_B pose, velocity in O (m/s) and angular rate in B (rad/s) of B in O
-  void truth(Stamp stamp, const Pose& X_OB, const Vec3& v_OB, const Vec3& w_OB_B);
+  /// Where O lies in W. The odometry decides that when it begins: until it has, truth waits, so
+  /// that all of it is in one frame.
+  void place_odom(const Pose& X_WO, bool has_begun);
+  /// @param X_WB, v_WB, w_WB_B pose, velocity in W (m/s) and angular rate in B (rad/s) of B in W
+  void truth(Stamp stamp, const Pose& X_WB, const Vec3& v_WB, const Vec3& w_WB_B);
+  /// To /tf.
+  void estimate(Stamp stamp, const Pose& X_OB);
   /// @pre image.depth_m has width * height values
   void depth(const DepthImage& image);
   /// Completes FILE. Without it FILE.active remains.
-  void close() { bag_.close(); }
+  void close();
 
  private:
   struct Topic {
@@ -56,17 +96,44 @@ class BagWriter {
   /// The topic of a device; made when its first message comes.
   Topic& topic_of(const std::string& device, const char* first, const char* further,
                   const RosMessageType& type);
+  struct TrueMotion {
+    Stamp stamp = 0;
+    Pose X_WB;
+    Vec3 v_WB, w_WB_B;
+  };
+  /// Writes what waits for O.
+  void write_truth();
   /// Starts message_ with a std_msgs/Header.
-  void begin(Topic& topic, Stamp stamp, const std::string& frame);
+  void begin_message(Topic& topic, Stamp stamp, const std::string& frame);
+  void put_header(Topic& topic, Stamp stamp, const std::string& frame);
+  void put_numbers(std::span<const double> values);
+  /// Writes message_, which arrives now.
+  void write(const Topic& topic) { file_->write(topic.connection, ros_time(now_), message_); }
+  void imu_on(Topic& topic, const ImuSample& sample);
+  void frame_end(const LidarScan& scan);
+  void cloud(const LidarScan& scan, const std::vector<LidarPoint>& points);
+  void custom(const LidarScan& scan, const std::vector<LidarPoint>& points);
+  void put_point(const LidarPoint& point, Stamp frame_begin);
+  void put_transform(Topic& topic, Stamp stamp, const std::string& parent, const std::string& child,
+                     const Pose& X);
+  [[nodiscard]] RosMessageType scan_type() const;
   void camera_info(const DepthImage& image);
   void static_transforms(const VehicleConfig& vehicle);
 
-  RosBag bag_;
+  std::unique_ptr<MessageFile> file_;
+  BagOptions options_;
+  Stamp now_ = 0;
   Topic imu_;
+  Topic livox_imu_;
+  Topic field_;
   Topic truth_;
+  Topic transforms_;
   Topic static_transforms_;
   std::map<std::string, Topic> of_devices_;  ///< by the topic's name
-  RosBytes message_;                         ///< the one being written
+  Pose X_WO_;
+  bool odom_begun_ = false;
+  std::vector<TrueMotion> waiting_;  ///< for O
+  RosBytes message_;                 ///< the one being written
 };
 
 }  // namespace arex::sim

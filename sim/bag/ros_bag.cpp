@@ -1,10 +1,10 @@
 #include "bag/ros_bag.h"
 
-#include <lz4frame.h>
-
 #include <algorithm>
 #include <exception>
 #include <stdexcept>
+
+#include "bag/lz4_frame.h"
 
 namespace arex::sim {
 namespace {
@@ -49,8 +49,6 @@ class Header {
  private:
   RosBytes bytes_;
 };
-
-std::filesystem::path active_name(std::filesystem::path path) { return path += ".active"; }
 
 void put_record(RosBytes& out, const Header& header, std::string_view data) {
   out.put(header.view());
@@ -105,7 +103,7 @@ void RosBag::finish_chunk() {
   if (chunk_.size() == 0) return;
   const std::uint64_t chunk_position = position_;
   const bool lz4 = compression_ == BagCompression::kLz4;
-  const std::string compressed = lz4 ? compressed_chunk() : std::string();
+  const std::string compressed = lz4 ? lz4_frame(chunk_.view()) : std::string();
   RosBytes out;
   put_record(out,
              Header(Op::kChunk)
@@ -152,22 +150,6 @@ void RosBag::put_index(RosBytes& out, std::uint64_t chunk_position) {
       .field("end_time", last)
       .field("count", connection_count);
   put_record(chunk_infos_, header, counts.view());
-}
-
-std::string RosBag::compressed_chunk() const {
-  // What ROS's lz4 reader demands: independent blocks, a checksum at the end of the content.
-  LZ4F_preferences_t preferences{};
-  preferences.frameInfo.blockSizeID = LZ4F_max4MB;
-  preferences.frameInfo.blockMode = LZ4F_blockIndependent;
-  preferences.frameInfo.contentChecksumFlag = LZ4F_contentChecksumEnabled;
-  std::string out(LZ4F_compressFrameBound(chunk_.size(), &preferences), '\0');
-  const std::size_t size =
-      LZ4F_compressFrame(out.data(), out.size(), chunk_.view().data(), chunk_.size(), &preferences);
-  if (LZ4F_isError(size)) {
-    throw std::runtime_error(file_.path().string() + ": " + LZ4F_getErrorName(size));
-  }
-  out.resize(size);
-  return out;
 }
 
 void RosBag::close() {

@@ -6,13 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "bag/ros_bytes.h"
-#include "bag/ros_messages.h"
+#include "bag/message_file.h"
 #include "files/files.h"
 
 namespace arex::sim {
-
-enum class BagCompression { kNone, kLz4 };
 
 /// Writes the container of a ROS 1 bag, format 2.0: what rosbag reads, indexed and chunked.
 ///
@@ -21,25 +18,18 @@ enum class BagCompression { kNone, kLz4 };
 /// pulls in plugin loaders, encryption and an embedded Python. The format itself is small. Source:
 /// wiki.ros.org/Bags/Format/2.0.
 ///
-/// As `rosbag record` does, the file is FILE.active while it grows; close() writes the index and
-/// renames it. A killed run leaves FILE.active with every whole chunk (`rosbag reindex` repairs
-/// it). Same calls, same bytes. One thread at a time.
-/// All functions throw DiskError when the disk refuses; no call but the destructor is of use after
-/// that.
-class RosBag {
+/// `rosbag reindex` repairs what a killed run leaves.
+class RosBag : public MessageFile {
  public:
   RosBag(std::filesystem::path path, BagCompression compression);
   /// Without close() the file stays FILE.active, its last chunk written if the disk allows.
-  ~RosBag();
-  RosBag(const RosBag&) = delete;
-  RosBag& operator=(const RosBag&) = delete;
+  ~RosBag() override;
 
-  /// Announces a topic; it is in the bag once it has a message. @return its connection
-  std::uint32_t add_topic(const std::string& topic, const RosMessageType& type, bool latched);
-  /// @param time of the recording, by which players order messages
-  void write(std::uint32_t connection, RosTime time, const RosBytes& message);
-  /// Everything up to here becomes a finished bag under its own name.
-  void close();
+  [[nodiscard]] WireFormat format() const override { return WireFormat::kRos1; }
+  std::uint32_t add_topic(const std::string& topic, const RosMessageType& type,
+                          bool latched) override;
+  void write(std::uint32_t connection, RosTime time, const RosBytes& message) override;
+  void close() override;
 
  private:
   struct IndexEntry {
@@ -58,7 +48,6 @@ class RosBag {
   void finish_chunk();
   /// Appends the open chunk's index records to `out` and its info record to chunk_infos_.
   void put_index(RosBytes& out, std::uint64_t chunk_position);
-  [[nodiscard]] std::string compressed_chunk() const;
   void require_open() const;
 
   std::filesystem::path path_;

@@ -1,6 +1,7 @@
 #include "bag/ros_messages.h"
 
 #include <initializer_list>
+#include <sstream>
 
 namespace arex::sim {
 namespace {
@@ -28,6 +29,13 @@ constexpr Part kPointField{"sensor_msgs/PointField",
                            "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\n"
                            "uint8 INT32=5\nuint8 UINT32=6\nuint8 FLOAT32=7\nuint8 FLOAT64=8\n"
                            "string name\nuint32 offset\nuint8 datatype\nuint32 count\n"};
+constexpr std::string_view kCustomMsg =
+    "Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+    "CustomPoint[] points\n";
+constexpr std::string_view kCustomPoint =
+    "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\n"
+    "uint8 line\n";
+constexpr std::string_view kCustomMsgMd5 = "e4d6829bdfe657cb6c21a746c86b21a6";
 constexpr Part kRegionOfInterest{"sensor_msgs/RegionOfInterest",
                                  "uint32 x_offset\nuint32 y_offset\nuint32 height\n"
                                  "uint32 width\nbool do_rectify\n"};
@@ -44,7 +52,35 @@ std::string definition(std::string_view own, std::initializer_list<Part> parts) 
   return text;
 }
 
+/// A line of a definition, as ROS 2 has it.
+std::string ros2_line(const std::string& line) {
+  if (line == "Header header") return "std_msgs/Header header";
+  if (line == "uint32 seq") return "";
+  if (line == "float64[] D") return "float64[] d";
+  if (line == "float64[9] K") return "float64[9] k";
+  if (line == "float64[9] R") return "float64[9] r";
+  if (line == "float64[12] P") return "float64[12] p";
+  if (line.starts_with("time ")) return "builtin_interfaces/Time " + line.substr(5);
+  return line;
+}
+
 }  // namespace
+
+std::string ros2_name(const RosMessageType& type) {
+  std::string name(type.name);
+  return name.insert(name.find('/'), "/msg");
+}
+
+std::string ros2_definition(const RosMessageType& type) {
+  std::istringstream lines(type.definition);
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    const std::string own = ros2_line(line);
+    if (!own.empty()) text += own + "\n";
+  }
+  return text + std::string(80, '=') +
+         "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+}
 
 RosMessageType imu_type() {
   return {"sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2",
@@ -94,6 +130,21 @@ RosMessageType tf_type() {
   return {"tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec",
           definition("geometry_msgs/TransformStamped[] transforms\n",
                      {kTransformStamped, kHeader, kTransform, kVector3, kQuaternion})};
+}
+
+RosMessageType time_reference_type() {
+  return {"sensor_msgs/TimeReference", "fded64a0265108ba86c3d38fb11c0c16",
+          definition("Header header\ntime time_ref\nstring source\n", {kHeader})};
+}
+
+RosMessageType livox_custom_type() {
+  return {"livox_ros_driver/CustomMsg", kCustomMsgMd5,
+          definition(kCustomMsg, {kHeader, {"livox_ros_driver/CustomPoint", kCustomPoint}})};
+}
+
+RosMessageType livox_custom2_type() {
+  return {"livox_ros_driver2/CustomMsg", kCustomMsgMd5,
+          definition(kCustomMsg, {kHeader, {"livox_ros_driver2/CustomPoint", kCustomPoint}})};
 }
 
 }  // namespace arex::sim

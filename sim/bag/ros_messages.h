@@ -5,7 +5,9 @@
 #include <vector>
 
 /// The ROS 1 message types that a bag of ours holds, as `rosmsg show` and `rosmsg md5` give them
-/// (common_msgs 1.13, geometry2 0.7), comments left out. A test compares them with Debian's.
+/// (common_msgs 1.13, geometry2 0.7), comments left out. A test compares them with Debian's, but
+/// for those of Livox's drivers (livox_ros_driver 2.6, livox_ros_driver2 1.2), which Debian has
+/// not.
 namespace arex::sim {
 
 struct RosMessageType {
@@ -14,11 +16,20 @@ struct RosMessageType {
   std::string definition;  ///< own text, then that of every type it contains
 };
 
+/// The type's name in ROS 2: package/msg/Type.
+std::string ros2_name(const RosMessageType& type);
+/// The same definition as ROS 2 has it (common_interfaces 4, geometry2 0.25): another header, other
+/// times, and names of fields in lower case.
+std::string ros2_definition(const RosMessageType& type);
+
 RosMessageType imu_type();
 RosMessageType point_cloud_type();
 RosMessageType odometry_type();
 RosMessageType image_type();
 RosMessageType camera_info_type();
 RosMessageType tf_type();
+RosMessageType time_reference_type();
+RosMessageType livox_custom_type();   ///< livox_ros_driver's CustomMsg
+RosMessageType livox_custom2_type();  ///< livox_ros_driver2's, which differs by name only
 
 }  // namespace arex::sim

@@ -109,6 +109,7 @@ Simulation::~Simulation() { jobs_.stop(); }
 
 bool Simulation::tick() {
   stack_->begin(now_);
+  if (outlets_.bag) outlets_.bag->begin(now_);
   fire_devices();
   run_stack();
   run_autopilot();
@@ -175,8 +176,9 @@ void Simulation::record() {
         scorer_.sample(truth, view, !autopilot_.landed(), physics_.battery());
     if (recorder_) recorder_->sample(now_, sample);
     if (outlets_.bag) {
-      const Pose X_OW = scorer_.X_WO().inverse();
-      outlets_.bag->truth(now_, X_OW * truth.X_WB, X_OW.R * truth.v_WB, truth.w_WB_B);
+      if (sample.estimate_X_OB) outlets_.bag->estimate(now_, *sample.estimate_X_OB);
+      outlets_.bag->place_odom(scorer_.X_WO(), scorer_.has_begun());
+      outlets_.bag->truth(now_, truth.X_WB, truth.v_WB, truth.w_WB_B);
     }
   }
   for (const Decision& decision : stack_->take_decisions()) {

@@ -80,6 +80,8 @@ class FlightScorer {
 
   /// O in W: where the stack's odometry began; until then where it should begin.
   [[nodiscard]] const Pose& X_WO() const { return X_WO_; }
+  /// Whether the odometry has: O stays where it is now.
+  [[nodiscard]] bool has_begun() const { return !flown_.poses.empty(); }
   [[nodiscard]] double distance_m() const { return distance_m_; }
   [[nodiscard]] FlightScore score(const Truth& truth, const FlightView& view) const;
 

@@ -6,6 +6,8 @@
 #include <functional>
 #include <limits>
 
+#include "bag/recording.h"
+#include "bag/sensor_decoder.h"
 #include "sample_data.h"
 #include "support/temporary_folder.h"
 
@@ -25,7 +27,9 @@ std::string message_of(const std::function<void()>& action) {
 }
 
 void write(const std::filesystem::path& file, BagCompression compression) {
-  BagWriter bag(file, VehicleConfig{}, compression);
+  BagOptions options;
+  options.compression = compression;
+  BagWriter bag(file, VehicleConfig{}, options);
   test::write_samples(bag);
   bag.close();
 }
@@ -71,6 +75,35 @@ TEST(BagWriter, LeavesADeviceInThePlaceOfItsDraftAlone) {
   const std::string message = message_of([&] { BagWriter(file, VehicleConfig{}); });
   EXPECT_NE(message.find(file.string()), std::string::npos) << message;
   EXPECT_NE(message.find("is a device, expected a file"), std::string::npos) << message;
+}
+
+TEST(BagWriter, WritesTheTruthInTheFrameThatTheOdometryBeginsIn) {
+  const TemporaryFolder folder;
+  const Pose X_WO{so3::Exp({0, 0, 0.5}), {1, 2, 3}};
+  {
+    BagWriter bag(folder / "a.bag", VehicleConfig{});
+    for (int i = 1; i <= 4; ++i) {
+      bag.begin(i);
+      // It guesses at first; the truth of before is written as that of after.
+      bag.place_odom(i < 3 ? Pose() : X_WO, i >= 3);
+      bag.truth(i, X_WO * Pose{Mat3::Identity(), {1.0 * i, 0, 0}}, Vec3::Zero(), Vec3::Zero());
+    }
+    bag.close();
+  }
+  Recording recording(folder / "a.bag");
+  RecordedMessage message;
+  int count = 0;
+  while (recording.next(message)) {
+    const RecordedTopic& topic = recording.topics()[message.topic];
+    if (topic.name != "/truth") continue;
+    const DecodedPose pose = decode_pose(topic.type, message.bytes, topic.format);
+    ++count;
+    EXPECT_EQ(pose.stamp, count);
+    EXPECT_EQ(message.time, count);
+    EXPECT_LT((pose.X.p - Vec3(count, 0, 0)).norm(), 1e-14);
+    EXPECT_LT((pose.X.R - Mat3::Identity()).norm(), 1e-14);
+  }
+  EXPECT_EQ(count, 4);
 }
 
 /// While it lives, files of this process end at `bytes`: a disk that fills up.
@@ -129,13 +162,13 @@ TEST(BagWriter, NamesTheFileWhenTheDiskFillsUp) {
 TEST(BagWriter, RefusesWhatABagCannotSay) {
   const TemporaryFolder folder;
   BagWriter bag(folder / "flight.bag", VehicleConfig{});
+  bag.place_odom(Pose(), true);
+  EXPECT_THROW(bag.truth(-1, Pose(), Vec3::Zero(), Vec3::Zero()), std::out_of_range);
   ImuSample early;
-  early.stamp = -kRosEpoch;
-  EXPECT_THROW(bag.imu(early), std::out_of_range);
-  early.stamp = 1 - kRosEpoch;  // a device's clock may lag; one nanosecond is a valid time
+  early.stamp = -1;  // a device's clock may lag: the first samples are none of ROS's
   EXPECT_NO_THROW(bag.imu(early));
   ImuSample late;
-  late.stamp = std::numeric_limits<Stamp>::max() - kRosEpoch;
+  late.stamp = std::numeric_limits<Stamp>::max();
   EXPECT_THROW(bag.imu(late), std::out_of_range);
   DepthImage image = test::depth_image(0);
   image.depth_m.pop_back();

@@ -1,16 +1,29 @@
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 
 #include "sample_data.h"
 
-/// write_bag none|lz4 close|kill FILE: the samples as a bag, or what a killed run leaves of it.
+/// write_bag none|lz4 close|kill|misses LAYOUT FILE: the samples as a bag, what a killed run leaves
+/// of it, or one scan with its misses.
 int main(int argc, char** argv) {
   using namespace arex::sim;
-  if (argc != 4) return 2;
-  const bool lz4 = std::string(argv[1]) == "lz4";
-  BagWriter bag(argv[3], arex::VehicleConfig{}, lz4 ? BagCompression::kLz4 : BagCompression::kNone);
+  if (argc != 5) return 2;
+  const std::string end = argv[2];
+  const auto layout = std::find(kBagLayoutNames.begin(), kBagLayoutNames.end(), argv[3]);
+  if (layout == kBagLayoutNames.end()) return 2;
+  BagOptions options;
+  options.layout = static_cast<BagLayout>(layout - kBagLayoutNames.begin());
+  if (std::string(argv[1]) == "lz4") options.compression = BagCompression::kLz4;
+  options.lidar_misses = end == "misses";
+  BagWriter bag(argv[4], arex::VehicleConfig{}, options);
+  if (end == "misses") {
+    bag.scan(test::scan_with_misses());
+    bag.close();
+    return 0;
+  }
   test::write_samples(bag);
-  if (std::string(argv[2]) == "kill") std::_Exit(0);
+  if (end == "kill") std::_Exit(0);
   bag.close();
   return 0;
 }

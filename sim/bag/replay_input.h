@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bag/recording.h"
+#include "bag/sensor_decoder.h"
+#include "messages/sensors.h"
+
+namespace arex::sim {
+
+enum class AccelUnit : std::uint8_t { kAuto, kG, kMps2 };
+
+/// What of a recording is replayed, and how its numbers are meant.
+struct ReplayOptions {
+  std::string lidar_topic;  ///< empty: of those with a fitting type the one with most messages
+  std::string imu_topic;    ///< likewise
+  std::string truth_topic;  ///< empty: of those with poses the first whose name says so
+  AccelUnit accel_unit = AccelUnit::kAuto;
+  TimeUnit time_unit = TimeUnit::kAuto;
+};
+
+/// How many messages a recording had of what is replayed, and what was wrong with them.
+struct MessageCounts {
+  std::uint64_t used = 0;
+  std::uint64_t damaged = 0;    ///< no such message, or no possible values
+  std::uint64_t unordered = 0;  ///< stamped before one that came earlier; left out
+  std::uint64_t doubled = 0;    ///< with the stamp of the one before; left out
+  std::uint64_t missing = 0;    ///< that gaps between stamps tell
+};
+
+/// What arrives at one moment.
+struct Arrival {
+  Stamp time = 0;
+  std::optional<ImuSample> imu;
+  LidarScanPtr scan;
+};
+
+struct StampedPose {
+  Stamp stamp = 0;
+  Pose X_WB;
+};
+
+/// A recording as the vehicle's sensors: samples and scans in order of arrival.
+///
+/// Times run from time_origin() on, a whole second, which is zero where the recording's own clock
+/// begins near zero, as that of our flights. A message arrives when it was recorded. Where that was
+/// by another clock than the stamps', the least delay of the first samples is taken for none.
+class ReplayInput {
+ public:
+  /// Looks through the beginning of the recording for topics, units, clocks and mounts.
+  /// @throws ConfigError for a topic that is not there, and where none fits.
+  ReplayInput(const std::filesystem::path& file, const ReplayOptions& options);
+
+  /// The next sample or scan. @return nothing at the end.
+  std::optional<Arrival> next();
+
+  /// Poses of the recording's truth in order of time; empty if it has none. Not to be called
+  /// between calls of next().
+  [[nodiscard]] std::vector<StampedPose> read_truth();
+
+  /// The LiDAR's frame in the IMU's: from /tf_static; of a Livox that stamps both with one frame
+  /// that of the maker; otherwise unknown.
+  [[nodiscard]] const std::optional<Pose>& X_BL() const { return X_BL_; }
+  /// The frames that it would be known for.
+  [[nodiscard]] const std::string& imu_frame() const { return imu_frame_; }
+  [[nodiscard]] const std::string& lidar_frame() const { return lidar_frame_; }
+
+  [[nodiscard]] Stamp time_origin() const { return origin_; }
+  [[nodiscard]] Stamp duration() const { return recording_.end() - recording_.begin(); }
+  [[nodiscard]] const std::string& lidar_topic() const { return name_of(lidar_); }
+  [[nodiscard]] const std::string& imu_topic() const { return name_of(imu_); }
+  [[nodiscard]] std::string truth_topic() const { return truth_ ? name_of(*truth_) : ""; }
+  [[nodiscard]] const MessageCounts& imu_counts() const { return imu_checks_.counts; }
+  [[nodiscard]] const MessageCounts& lidar_counts() const { return scan_checks_.counts; }
+  [[nodiscard]] const RecordingDamage& damage() const { return recording_.damage(); }
+  /// What a reader of the results should know; a sentence each.
+  [[nodiscard]] std::vector<std::string> notes() const;
+
+ private:
+  /// That stamps increase, and by how much.
+  struct StampChecks {
+    MessageCounts counts;
+    Stamp period = 0;  ///< usual; 0: not known
+    std::optional<Stamp> last;
+    /// @return whether the message is to be used.
+    bool accept(Stamp stamp);
+  };
+
+  [[nodiscard]] const std::string& name_of(std::size_t topic) const {
+    return recording_.topics()[topic].name;
+  }
+  void survey();
+  void find_mount(const std::vector<DecodedTransform>& transforms);
+  std::optional<ImuSample> imu_of(const RecordedMessage& message);
+  LidarScanPtr scan_of(const RecordedMessage& message);
+  [[nodiscard]] Stamp run_time(Stamp recorded) const;
+
+  Recording recording_;
+  ReplayOptions options_;
+  std::size_t imu_ = 0, lidar_ = 0;  ///< topics
+  std::optional<std::size_t> truth_;
+  std::vector<std::size_t> frame_ends_, transforms_;
+  ScanDecoder decoder_;
+  double accel_factor_ = 1;  ///< to m/s^2
+  bool accel_unit_told_ = true;
+  std::string imu_frame_, lidar_frame_;
+  std::optional<Pose> X_BL_;
+  Stamp origin_ = 0;
+  Stamp clock_shift_ = 0;  ///< of arrivals behind stamps, by the clocks' difference
+  std::optional<DecodedFrameEnd> frame_end_;  ///< the newest
+  StampChecks imu_checks_, scan_checks_;
+};
+
+}  // namespace arex::sim

@@ -47,6 +47,7 @@ struct VehicleConfig {
   double ground_offset_m = 0.14;                  ///< height of B above the ground when standing
   Vec3 lidar_position_m{0.15, 0.0, 0.01};         ///< p_BL
   double lidar_pitch_rad = std::numbers::pi / 4;  ///< the dome leans forward by this (paper, II-A)
+  Vec3 lidar_rotation_rad = Vec3::Zero();         ///< of other people's mounts, before the lean
   Vec3 camera_position_m{0.14, 0.0,
                          0.07};   ///< p_BC, the left imager: above the LiDAR (paper, II-A)
   double camera_pitch_rad = 0.0;  ///< positive looks down
@@ -54,8 +55,13 @@ struct VehicleConfig {
 
   /// Returns nearer to B are the vehicle's own, to the maps.
   [[nodiscard]] double own_returns_m() const { return radius_m + own_returns_margin_m; }
-  /// LiDAR frame in B: rotated about y.
-  [[nodiscard]] Pose X_BL() const { return {so3::Exp({0, lidar_pitch_rad, 0}), lidar_position_m}; }
+  /// LiDAR frame in B: turned, then rotated about its y.
+  [[nodiscard]] Pose X_BL() const {
+    const Mat3 lean = so3::Exp({0, lidar_pitch_rad, 0});
+    // A product with the identity may change the sign of a zero, and so the hash of a flight.
+    const bool leans_only = lidar_rotation_rad.isZero(0);
+    return {leans_only ? lean : Mat3(so3::Exp(lidar_rotation_rad) * lean), lidar_position_m};
+  }
   /// Camera frame in B: z forward, x right, y down.
   [[nodiscard]] Pose X_BC() const {
     return {so3::Exp({0, camera_pitch_rad, 0}) * MountConfig::forward(), camera_position_m};
@@ -79,6 +85,9 @@ struct VehicleConfig {
     f("ground_offset_m", ground_offset_m, "height of B above the ground when standing");
     f("lidar_position_m", lidar_position_m, "LiDAR origin in B");
     f("lidar_pitch_rad", lidar_pitch_rad, "forward lean of the LiDAR (paper, II-A)");
+    f("lidar_rotation_rad", lidar_rotation_rad,
+      "rotation vector from B's axes to those that the LiDAR leans in; for recordings of other "
+      "vehicles");
     f("camera_position_m", camera_position_m, "left imager in B");
     f("camera_pitch_rad", camera_pitch_rad, "camera pitch, positive looks down");
     f("mounts", mounts,

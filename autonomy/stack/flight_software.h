@@ -15,6 +15,7 @@
 #include "messages/commands.h"
 #include "messages/estimates.h"
 #include "messages/events.h"
+#include "messages/odometry_need.h"
 #include "messages/operator.h"
 #include "messages/sensors.h"
 #include "mission/mission.h"
@@ -43,6 +44,7 @@ struct FlightView {
   std::shared_ptr<const OccupancyMap2D> map_2d;  ///< null before the first
   double known_volume_m3;                        ///< when map_2d was taken
   const PlanCounts& plans;
+  OdometryNeed need;  ///< what keeps the odometry from being ok
 };
 
 /// The flight software as the vehicle around it knows it: fed with what the sensors deliver, in the

@@ -320,7 +320,8 @@ FlightView Stack::view() const {
                   perception_.grid(),
                   perception_.map_2d(),
                   perception_.known_volume_m3(),
-                  navigator_.counts()};
+                  navigator_.counts(),
+                  odometry_need()};
   for (std::size_t i = 1; i < sources_.size(); ++i) {
     view.others.push_back({sources_[i].name, &sources_[i].odometry->odometry()});
   }

@@ -88,6 +88,22 @@ struct ReportArguments {
 };
 int report(const ReportArguments& arguments);
 
+struct ReplayArguments {
+  std::string recording;               ///< a ROS 1 bag or MCAP
+  std::string out;                     ///< run folder to write
+  std::string config;                  ///< a scenario; empty: the defaults
+  std::vector<std::string> overrides;  ///< --set key=value
+  std::string lidar_topic, imu_topic;  ///< empty: told by type
+  std::string truth_topic;             ///< empty: told by type and name
+  std::string truth;                   ///< TUM file; empty: what the recording has
+  std::string imu_unit = "auto";       ///< of accelerations: auto, g or mps2
+  std::string time_unit = "auto";      ///< of points: auto, s, ms, us or ns
+  int threads = 1;
+  bool report = true;  ///< also write report.html
+  bool quiet = false;
+};
+int replay(const ReplayArguments& arguments);
+
 struct EvaluateArguments {
   std::vector<std::string> files;  ///< estimates and, without `truth`, the reference behind them
   std::string truth;               ///< a trajectory or a run folder; empty: the last of the files

@@ -175,6 +175,32 @@ void add_evaluate(CLI::App& app, EvaluateArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = evaluate(arguments); });
 }
 
+void add_replay(CLI::App& app, ReplayArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "run odometry and maps on a recording");
+  command->add_option("recording", arguments.recording, "a ROS 1 bag or MCAP")->required();
+  command->add_option("--out", arguments.out, "run folder to write")->required();
+  command->add_option("--config", arguments.config,
+                      "scenario whose vehicle, odometry and maps are taken; default the defaults");
+  command->add_option("--set", arguments.overrides, "key=value over what the file says")
+      ->allow_extra_args(false);
+  command->add_option("--lidar-topic", arguments.lidar_topic, "default: told by its type");
+  command->add_option("--imu-topic", arguments.imu_topic, "default: told by its type");
+  command->add_option("--truth-topic", arguments.truth_topic,
+                      "default: poses whose topic's name says so");
+  command->add_option("--truth", arguments.truth, "a trajectory, in place of such a topic");
+  command->add_option("--imu-unit", arguments.imu_unit, "of accelerations: auto, g or mps2")
+      ->check(CLI::IsMember({"auto", "g", "mps2"}))
+      ->capture_default_str();
+  command->add_option("--time-unit", arguments.time_unit, "of points' times: auto, s, ms, us or ns")
+      ->check(CLI::IsMember({"auto", "s", "ms", "us", "ns"}))
+      ->capture_default_str();
+  add_number(*command, "--threads", arguments.threads, Range<int>{1, 64},
+             "host threads; the result does not change");
+  command->add_flag("!--no-report", arguments.report, "no report.html");
+  command->add_flag("--quiet", arguments.quiet, "no progress line");
+  command->callback([&] { exit_code = replay(arguments); });
+}
+
 void add_semantics(CLI::App& app, SemanticsArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("semantics", "name what a point cloud shows");
   command->add_option("cloud", arguments.input, "CLOUD.pcd, CLOUD.ply or a run folder")->required();
@@ -241,6 +267,7 @@ int execute(int argc, char** argv) {
   SweepArguments sweep_arguments;
   SweepTaskArguments sweep_task_arguments;
   ReportArguments report_arguments;
+  ReplayArguments replay_arguments;
   EvaluateArguments evaluate_arguments;
   SemanticsArguments semantics_arguments;
   ScenarioArguments params_arguments;
@@ -253,6 +280,7 @@ int execute(int argc, char** argv) {
   add_sweep(app, sweep_arguments, exit_code);
   add_sweep_task(app, sweep_task_arguments, exit_code);
   add_report(app, report_arguments, exit_code);
+  add_replay(app, replay_arguments, exit_code);
   add_evaluate(app, evaluate_arguments, exit_code);
   add_semantics(app, semantics_arguments, exit_code);
   add_help(app, help_topic, exit_code);

@@ -143,12 +143,12 @@ void Recorder::sample(Stamp stamp, const FlightSample& sample) {
   }
   if (!sample.row) return;
   const FlightRow& row = *sample.row;
-  append(
-      flight_,
-      fmt::format("{:.3f},{:.4f},{},{:.4f},{:.5f},{},{:.4f},{:.3f},{:.1f},{:.5f}\n",
-                  to_seconds(row.stamp), row.speed_mps, csv_number(row.tracking_error_m, 4),
-                  row.odometry_error_m, row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4),
-                  row.height_m, row.battery_voltage_v, row.battery_power_w, row.battery_fraction));
+  append(flight_,
+         fmt::format("{:.3f},{:.4f},{},{:.4f},{:.5f},{},{:.4f},{},{},{}\n", to_seconds(row.stamp),
+                     row.speed_mps, csv_number(row.tracking_error_m, 4), row.odometry_error_m,
+                     row.odometry_yaw_error_rad, csv_number(row.clearance_m, 4), row.height_m,
+                     csv_number(row.battery_voltage_v, 3), csv_number(row.battery_power_w, 1),
+                     csv_number(row.battery_fraction, 5)));
 }
 
 void Recorder::decision(const Decision& decision) {

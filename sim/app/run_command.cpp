@@ -95,13 +95,12 @@ void check_outputs(const RunArguments& arguments, const std::filesystem::path& f
   sim::expect_different_files(files);
 }
 
-sim::BagOptions bag_options(const RunArguments& arguments, const sim::Scenario& scenario) {
+sim::BagOptions bag_options(const RunArguments& arguments) {
   const auto named =
       std::find(sim::kBagLayoutNames.begin(), sim::kBagLayoutNames.end(), arguments.bag_layout);
   return {
       static_cast<sim::BagLayout>(named - sim::kBagLayoutNames.begin()),
-      arguments.bag_compression == "lz4" ? sim::BagCompression::kLz4 : sim::BagCompression::kNone,
-      scenario.config.lidar.model.misses_in_bag};
+      arguments.bag_compression == "lz4" ? sim::BagCompression::kLz4 : sim::BagCompression::kNone};
 }
 
 /// What a flight leaves: the run folder and, if asked for, a bag. A file that the disk refuses does
@@ -112,7 +111,7 @@ class Outputs {
   void begin(const RunArguments& arguments, const sim::Scenario& scenario,
              const std::filesystem::path& folder, sim::Simulation& simulation) {
     if (!arguments.bag.empty()) {
-      bag_.emplace(arguments.bag, scenario.config.stack.vehicle, bag_options(arguments, scenario));
+      bag_.emplace(arguments.bag, scenario.config.stack.vehicle, bag_options(arguments));
     }
     recorder_.emplace(folder, scenario.resolved_yaml());
     simulation.record_to(*recorder_);

@@ -54,21 +54,6 @@ constexpr std::array<PointFieldRow, 7> kDriver2Fields{{{"x", 0, FieldType::kFloa
                                                        {"timestamp", 18, FieldType::kFloat64}}};
 constexpr std::uint32_t kDriver2Step = 26;
 
-constexpr double kTeslaPerGauss = 1e-4;
-
-/// The scan with its firings that returned nothing: at the origin, as the driver writes them.
-std::vector<LidarPoint> every_firing(const LidarScan& scan) {
-  if (scan.packets_ns.empty()) return scan.points;
-  std::vector<LidarPoint> all(static_cast<std::size_t>(scan.firings()));
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    const auto firing = static_cast<std::int64_t>(i);
-    all[i].offset_ns = scan.firing_ns(firing);
-    all[i].line = static_cast<std::uint8_t>(firing % LidarScan::kLines);
-  }
-  for (const LidarPoint& point : scan.points) all[point.firing] = point;
-  return all;
-}
-
 /// A 3x3 (9 values) or 6x6 (36 values) covariance of zeros but for its first value.
 template <std::size_t size>
 std::array<double, size> covariance(double first = 0) {
@@ -89,7 +74,6 @@ BagWriter::BagWriter(const std::filesystem::path& path, const VehicleConfig& veh
       options_(options),
       imu_(topic("/imu/data", imu_type())),
       livox_imu_(topic("/livox/imu", imu_type())),
-      field_(topic("/imu/mag", magnetic_field_type())),
       truth_(topic("/truth", odometry_type())),
       transforms_(topic("/tf", tf_type())),
       static_transforms_(topic("/tf_static", tf_type(), true)),
@@ -157,10 +141,6 @@ void BagWriter::imu(const ImuSample& sample) {
   if (sample.stamp < 0) return;  // its clock lags, and the run has just begun
   imu_on(imu_, sample);
   imu_on(livox_imu_, sample);
-  begin_message(field_, sample.stamp, kBodyFrame);
-  message_.put(kTeslaPerGauss * sample.field_gauss);
-  put_numbers(covariance<9>());
-  write(field_);
 }
 
 void BagWriter::put_point(const LidarPoint& point, Stamp frame_begin) {
@@ -187,17 +167,14 @@ void BagWriter::frame_end(const LidarScan& scan) {
 
 void BagWriter::scan(const LidarScan& scan) {
   frame_end(scan);
-  const std::vector<LidarPoint> every =
-      options_.lidar_misses ? every_firing(scan) : std::vector<LidarPoint>{};
-  const std::vector<LidarPoint>& points = options_.lidar_misses ? every : scan.points;
   Topic& topic = topic_of(scan.device, kScans, "/points", scan_type());
   begin_message(topic, scan.stamp, lidar_frame(scan.device));
   const bool is_custom =
       options_.layout == BagLayout::kLivoxCustom || options_.layout == BagLayout::kLivoxCustom2;
   if (is_custom) {
-    custom(scan, points);
+    custom(scan, scan.points);
   } else {
-    cloud(scan, points);
+    cloud(scan, scan.points);
   }
   write(topic);
 }

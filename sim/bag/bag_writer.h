@@ -31,7 +31,6 @@ inline constexpr std::array<std::string_view, 4> kBagLayoutNames{"generic", "liv
 struct BagOptions {
   BagLayout layout = BagLayout::kGeneric;
   BagCompression compression = BagCompression::kNone;
-  bool lidar_misses = false;  ///< firings without a return are written, too
 };
 
 /// What the vehicle's sensors gave, as a recording on which others can run their own odometry: a
@@ -39,7 +38,6 @@ struct BagOptions {
 ///
 ///     /imu/data            sensor_msgs/Imu          base_link; no orientation (covariance -1)
 ///     /livox/imu           the same under the name that Livox's driver has
-///     /imu/mag             sensor_msgs/MagneticField base_link, tesla; with every /imu/data
 ///     /livox/lidar         see BagLayout            livox_frame; one message per LiDAR frame
 ///     /livox/frame_end     sensor_msgs/TimeReference when the frame was closed
 ///     /truth               nav_msgs/Odometry        odom -> base_link, twist in base_link
@@ -50,10 +48,8 @@ struct BagOptions {
 ///     latched
 ///
 /// odom is O, base_link is B (the IMU), livox_frame is L, camera_depth_optical_frame is C. Points
-/// are in L, each at its own time. They stand in firing order, their times run backwards where the
-/// device's packets were stamped so. Firings without a return are left out, or, if asked for, have
-/// their line, their time and zeros, as the driver writes them. A depth that was not measured is
-/// NaN (REP 118).
+/// are in L, each at its own time, in firing order; firings without a return are left out. A depth
+/// that was not measured is NaN (REP 118).
 ///
 /// Further LiDARs and cameras have topics and frames of their names: /NAME/points in NAME_frame,
 /// /NAME/depth and /NAME/camera_info in NAME_optical_frame.
@@ -72,7 +68,7 @@ class BagWriter {
 
   /// Sets the clock: what is written from here on arrives at `now`.
   void begin(Stamp now) { now_ = now; }
-  /// To /imu/data, /livox/imu and /imu/mag.
+  /// To /imu/data and /livox/imu.
   void imu(const ImuSample& sample);
   void scan(const LidarScan& scan);
   /// Where O lies in W. The odometry decides that when it begins: until it has, truth waits, so
@@ -125,7 +121,6 @@ class BagWriter {
   Stamp now_ = 0;
   Topic imu_;
   Topic livox_imu_;
-  Topic field_;
   Topic truth_;
   Topic transforms_;
   Topic static_transforms_;

@@ -17,25 +17,7 @@ inline constexpr int kDepthImages = 3;
 inline ImuSample imu_sample(int i) {
   return {i * kImuPeriod,
           {0.25 * i, -0.5 * i, 1.0 + i},
-          {0.125, -0.0625 * i, 9.75 + i},
-          {0.5, 0.25 * i, -0.125}};
-}
-
-/// Two packets of which the second is stamped 100 us before the first's end; every fifth firing
-/// returned.
-inline LidarScan scan_with_misses() {
-  LidarScan scan{"", 0, kScanPeriod, {}, {1000, 381'000}};
-  for (int k = 0; k < 192; k += 5) {
-    LidarPoint point;
-    point.p_L = {static_cast<float>(1 + k), 2, 3};
-    point.intensity = 7;
-    point.firing = static_cast<std::uint16_t>(k);
-    point.offset_ns = scan.firing_ns(k);
-    point.line = static_cast<std::uint8_t>(k % 4);
-    point.tag = 5;
-    scan.points.push_back(point);
-  }
-  return scan;
+          {0.125, -0.0625 * i, 9.75 + i}};
 }
 
 inline LidarScan lidar_scan(int i) {

@@ -4,8 +4,8 @@
 
 #include "sample_data.h"
 
-/// write_bag none|lz4 close|kill|misses LAYOUT FILE: the samples as a bag, what a killed run leaves
-/// of it, or one scan with its misses.
+/// write_bag none|lz4 close|kill LAYOUT FILE: the samples as a bag, or what a killed run leaves of
+/// it.
 int main(int argc, char** argv) {
   using namespace arex::sim;
   if (argc != 5) return 2;
@@ -15,13 +15,7 @@ int main(int argc, char** argv) {
   BagOptions options;
   options.layout = static_cast<BagLayout>(layout - kBagLayoutNames.begin());
   if (std::string(argv[1]) == "lz4") options.compression = BagCompression::kLz4;
-  options.lidar_misses = end == "misses";
   BagWriter bag(argv[4], arex::VehicleConfig{}, options);
-  if (end == "misses") {
-    bag.scan(test::scan_with_misses());
-    bag.close();
-    return 0;
-  }
   test::write_samples(bag);
   if (end == "kill") std::_Exit(0);
   bag.close();

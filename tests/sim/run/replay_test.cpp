@@ -68,7 +68,6 @@ TEST_P(RecordedFlight, GivesItsEstimatesAndItsMapWhenReplayed) {
   BagOptions options;
   options.layout = GetParam();
   options.compression = BagCompression::kLz4;
-  options.lidar_misses = GetParam() == BagLayout::kLivoxDriver2;
   fly(flown, folder.path(), options);
   if (HasFatalFailure()) return;
 

@@ -104,7 +104,6 @@ const scanType = layout === "livox_custom2" ? "livox_ros_driver2/msg/CustomMsg"
 const TOPICS = {
   "/imu/data": ["sensor_msgs/msg/Imu", 200, checkImu],
   "/livox/imu": ["sensor_msgs/msg/Imu", 200, checkImu],
-  "/imu/mag": ["sensor_msgs/msg/MagneticField", 200, () => {}],
   "/livox/lidar": [scanType, 10, checkScan],
   "/livox/frame_end": ["sensor_msgs/msg/TimeReference", 10, checkFrameEnd],
   "/truth": ["nav_msgs/msg/Odometry", 200, checkTruth],

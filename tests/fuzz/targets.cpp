@@ -177,17 +177,17 @@ const std::vector<std::string>& recorded_bags() {
         const bool packed = std::string_view(name).starts_with("packed");
         sim::BagWriter bag(
             folder / name, VehicleConfig{},
-            {layout, packed ? sim::BagCompression::kLz4 : sim::BagCompression::kNone, false});
+            {layout, packed ? sim::BagCompression::kLz4 : sim::BagCompression::kNone});
         bag.place_odom(Pose(), true);
         for (int i = 0; i < 60; ++i) {
           const Stamp now = (i + 1) * 5 * kNanosecondsPerTick;
           bag.begin(now);
-          bag.imu({now, {0.1, 0, 0}, {0, 0, kGravity}, {0, 0, 0}});
+          bag.imu({now, {0.1, 0, 0}, {0, 0, kGravity}});
           bag.truth(now, Pose(), Vec3::Zero(), Vec3::Zero());
           if (i % 20 != 0) continue;
           LidarScan scan{"", now, now + 1, {}};
           for (std::uint32_t k = 0; k < 12; ++k) {
-            scan.points.push_back({Vec3f(1, 2, static_cast<float>(k)), 7, 5000 * k, 1, 0, 0});
+            scan.points.push_back({Vec3f(1, 2, static_cast<float>(k)), 7, 5000 * k, 1, 0});
           }
           bag.scan(scan);
         }

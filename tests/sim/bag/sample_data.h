@@ -15,9 +15,7 @@ inline constexpr int kScanPoints = 20'000;
 inline constexpr int kDepthImages = 3;
 
 inline ImuSample imu_sample(int i) {
-  return {i * kImuPeriod,
-          {0.25 * i, -0.5 * i, 1.0 + i},
-          {0.125, -0.0625 * i, 9.75 + i}};
+  return {i * kImuPeriod, {0.25 * i, -0.5 * i, 1.0 + i}, {0.125, -0.0625 * i, 9.75 + i}};
 }
 
 inline LidarScan lidar_scan(int i) {

@@ -286,7 +286,8 @@ Scenario load_scenario(const std::filesystem::path& file, const std::vector<std:
                        std::optional<std::uint64_t> seed) {
   ConfigNode source = file.empty() ? parse_yaml("", "defaults") : load_yaml(file);
   if (const ConfigNode* base = source.find("base")) {
-    throw ConfigError(base->where + ": 'base' makes this a sweep, expected a scenario; `arex sweep " +
+    throw ConfigError(base->where +
+                      ": 'base' makes this a sweep, expected a scenario; `arex sweep " +
                       file.string() + " --dry-run` lists what it flies");
   }
   for (const std::string& assignment : overrides) apply_override(source, assignment);

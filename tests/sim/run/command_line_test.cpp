@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "support/process.h"
+#include "support/sanitized.h"
 
 // The contract of the command line, kept by the binary itself.
 namespace arex {
@@ -86,13 +87,6 @@ double cpu_of_children_s() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// A sanitizer's build does the same with several times the work.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kAtOnce_s = 10;
-#else
-constexpr double kAtOnce_s = 1;
-#endif
-
 // Exit code 2 and one printable line that names the option, within a second.
 void expect_option_refused(const std::vector<std::string>& arguments, const std::string& expected) {
   const double begin_s = cpu_of_children_s();
@@ -102,7 +96,7 @@ void expect_option_refused(const std::vector<std::string>& arguments, const std:
   EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_LT(result.err.size(), 300u) << result.err;
-  EXPECT_LT(took_s, kAtOnce_s) << expected;
+  EXPECT_LT(took_s, 1 * test::kSlowdown) << expected;
   for (const char c : result.err) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20);
 }
 

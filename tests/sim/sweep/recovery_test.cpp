@@ -7,6 +7,7 @@
 
 #include "sim/sweep/sweep_files.h"
 #include "support/process.h"
+#include "support/sanitized.h"
 
 // A sweep loses nothing and flies nothing twice, whatever dies.
 namespace arex {
@@ -236,6 +237,7 @@ TEST_F(SweepRecovery, AnInterruptStopsItAndTheSameCommandGoesOn) {
 TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
   const TemporaryFolder folder;
   // A world that nobody can start from is refused; the whole mission takes longer than 8 s.
+  const std::string limit_s = std::to_string(8 * test::kSlowdown);
   write_text(folder / "sweep.yaml",
              "list:\n"
              "  - {name: walled in, base: " AREX_SOURCE_DIR
@@ -246,7 +248,8 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
              "world.forest.clearings: [{centre_m: [8, 8], radius_m: 4}]}\n"
              "  - {name: endless, base: " AREX_SOURCE_DIR
              "/scenarios/waypoints.yaml}\n"
-             "timeout_s: 8\nretries: 1\n");
+             "timeout_s: " +
+                 limit_s + "\nretries: 1\n");
   const fs::path out = folder / "out";
   const ProcessResult result = arex(sweep_arguments(folder / "sweep.yaml", out));
   EXPECT_EQ(result.exit_code, 1);
@@ -255,7 +258,7 @@ TEST(SweepFailures, AreRecordedWithTheirCauseAndTriedAsOftenAsAsked) {
   EXPECT_NE(rows[1].find("walled in"), std::string::npos);
   EXPECT_NE(rows[1].find(",refused,"), std::string::npos) << rows[1];
   EXPECT_NE(rows[1].find("leaves no free start"), std::string::npos) << rows[1];
-  EXPECT_NE(rows[2].find(",overran,killed after 8 s"), std::string::npos) << rows[2];
+  EXPECT_NE(rows[2].find(",overran,killed after " + limit_s + " s"), std::string::npos) << rows[2];
   std::multiset<std::size_t> starts;
   for (const auto& [id, events] : events_by_run(out)) {
     starts.insert(static_cast<std::size_t>(std::count(events.begin(), events.end(), "start")));

@@ -123,8 +123,9 @@ std::vector<FigureInfo> tour_figures() {
       {"tour.time_ratio", "time over the omniscient tour's", "1", kLess, true,
        "sim_time_s over tour.time_s; likewise"},
       {"tour.path_m", "omniscient tour's path", "m", kNeither, false,
-       "that shows whoever knows the world scoring.tour.area_share of the area, from take-off to "
-       "landing; a good one, not proven shortest; null: scoring.tour.enabled is false"},
+       "on which whoever knows the world sees scoring.tour.area_share of what can be covered, from "
+       "take-off to landing; a good one, not proven shortest; null: scoring.tour.enabled is false, "
+       "or the area above scoring.tour.max_area_m2"},
       {"tour.time_s", "omniscient tour's time", "s", kNeither, false,
        "along it at the planner's limits of speed and acceleration"},
       {"tour.viewpoints", "omniscient tour's viewpoints", "", kNeither, false,

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "math/random.h"
 #include "scoring/flight_ways.h"
 #include "scoring/sight_map.h"
 #include "scoring/tour_order.h"
@@ -67,7 +68,8 @@ class TourPlan {
 
  private:
   [[nodiscard]] std::vector<Vantage> find_vantages(std::span<const Vec3f> area_cells_W) const;
-  void choose_stops(const std::vector<Vantage>& vantages);
+  void choose_stops(const std::vector<Vantage>& vantages, const std::vector<double>& weights);
+  void improve(const std::vector<Vantage>& vantages);
   void order_stops();
   bool drop_a_stop();
   bool move_a_stop(std::size_t stop, const std::vector<Vantage>& vantages);
@@ -108,10 +110,39 @@ class TourPlan {
   std::vector<Bits> sights_;
 };
 
+// Greedy randomised search (Feo and Resende, 1995): a local optimum from each of several covers,
+// the first of them the greedy one. Looking around is what costs time, and how many looks an
+// optimum takes depends on the world.
 void TourPlan::make(std::span<const Vec3f> area_cells_W) {
-  constexpr int kRounds = 10;  // far more than it takes
   const std::vector<Vantage> vantages = find_vantages(area_cells_W);
-  choose_stops(vantages);
+  Bits all = seen_from(stops_[0].node);
+  for (const Vantage& vantage : vantages) add_bits(all, seen_from(vantage.node));
+  wanted_ = static_cast<std::size_t>(
+      std::ceil(config_.area_share * static_cast<double>(count_bits(all))));
+  constexpr int kMostCovers = 8;  // where there is nothing new to look at
+  constexpr double kLeastWeight = 0.7;
+  RandomStream random(0, "omniscient_tour");
+  std::vector<double> weights(vantages.size(), 1.0);
+  std::vector<Stop> best_stops;
+  std::vector<Leg> best_legs;
+  for (int cover = 0; cover < kMostCovers; ++cover) {
+    if (cover > 0 && static_cast<int>(sights_.size()) >= config_.looks) break;
+    stops_.resize(1);
+    legs_.clear();
+    choose_stops(vantages, weights);
+    improve(vantages);
+    if (cover == 0 || length_of(legs_) < length_of(best_legs)) {
+      best_stops = stops_;
+      best_legs = legs_;
+    }
+    for (double& weight : weights) weight = random.uniform(kLeastWeight, 1);
+  }
+  stops_ = std::move(best_stops);
+  legs_ = std::move(best_legs);
+}
+
+void TourPlan::improve(const std::vector<Vantage>& vantages) {
+  constexpr int kRounds = 10;  // more than it takes
   order_stops();
   for (int round = 0; round < kRounds; ++round) {
     bool changed = false;
@@ -152,29 +183,31 @@ std::vector<Vantage> TourPlan::find_vantages(std::span<const Vec3f> area_cells_W
   return vantages;
 }
 
-// Greedy set cover with lazy evaluation: a gain only falls while the cover grows, so that what was
-// worked out before bounds it (Minoux, 1978).
-void TourPlan::choose_stops(const std::vector<Vantage>& vantages) {
+// Greedy set cover, each gain weighted, with lazy evaluation: a gain only falls while the cover
+// grows, so that what was worked out before bounds it (Minoux, 1978).
+void TourPlan::choose_stops(const std::vector<Vantage>& vantages,
+                            const std::vector<double>& weights) {
+  struct Gain {
+    double value;
+    std::size_t vantage;
+    bool operator<(const Gain& other) const {  // of equal ones the first vantage is the greatest
+      return value < other.value || (value == other.value && vantage > other.vantage);
+    }
+  };
   Bits seen = seen_from(stops_[0].node);
-  Bits all = seen;
-  using Gain = std::pair<std::size_t, std::size_t>;  // and the vantage, the first ones greatest
+  const auto gain_of = [&](std::size_t i) {
+    return Gain{weights[i] * static_cast<double>(count_new(seen, seen_from(vantages[i].node))), i};
+  };
   std::priority_queue<Gain> gains;
-  for (std::size_t i = 0; i < vantages.size(); ++i) {
-    const Bits& own = seen_from(vantages[i].node);
-    add_bits(all, own);
-    gains.emplace(count_new(seen, own), vantages.size() - 1 - i);
-  }
-  wanted_ = static_cast<std::size_t>(
-      std::ceil(config_.area_share * static_cast<double>(count_bits(all))));
+  for (std::size_t i = 0; i < vantages.size(); ++i) gains.push(gain_of(i));
   while (count_bits(seen) < wanted_) {
-    const std::size_t key = gains.top().second;
+    const Gain gain = gain_of(gains.top().vantage);
     gains.pop();
-    const Node node = vantages[vantages.size() - 1 - key].node;
-    const Gain gain(count_new(seen, seen_from(node)), key);
     if (!gains.empty() && gain < gains.top()) {
       gains.push(gain);
       continue;
     }
+    const Node node = vantages[gain.vantage].node;
     add_bits(seen, seen_from(node));
     stops_.push_back(stop_at(node));
   }
@@ -327,7 +360,7 @@ double TourPlan::area_fraction(std::span<const Vec3> way_W) const {
   for (const Vec3& p : with_points_between(way_W, config_.sight_step_m)) {
     add_bits(seen, sight_.seen_from(p.head<2>()));
   }
-  return static_cast<double>(count_bits(seen)) / static_cast<double>(sight_.patches());
+  return static_cast<double>(count_bits(seen)) / static_cast<double>(count_bits(sight_.area()));
 }
 
 /// The speed at a corner of so many radians that the arc allows which rounds it.
@@ -378,7 +411,9 @@ std::optional<OmniscientTour> plan_omniscient_tour(const OmniscientTourConfig& c
                                                    double vehicle_radius_m,
                                                    std::span<const Vec3f> area_cells_W,
                                                    const TourMission& mission) {
-  if (area_cells_W.empty()) return std::nullopt;
+  Eigen::AlignedBox2d box;
+  for (const Vec3f& cell : area_cells_W) box.extend(cell.head<2>().cast<double>());
+  if (box.isEmpty() || box.volume() > config.max_area_m2) return std::nullopt;
   ReachableSpaceConfig space;
   space.resolution_m = config.resolution_m;
   std::optional<FlightWays> ways;

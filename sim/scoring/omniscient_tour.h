@@ -20,7 +20,9 @@ struct OmniscientTourConfig {
   double viewpoint_spacing_m = 2.0;
   double sight_step_m = 1.0;
   double resolution_m = 0.2;
+  double max_area_m2 = 10000;
   double corner_cut_m = 0.2;
+  int looks = 2500;
   int perturbations = 200;
 
   void fields(auto& f) {
@@ -32,7 +34,13 @@ struct OmniscientTourConfig {
     f("viewpoint_spacing_m", viewpoint_spacing_m, "one place to see from in each square this wide");
     f("sight_step_m", sight_step_m, "on its way it looks around this often");
     f("resolution_m", resolution_m, "cells of the space that it flies through");
+    f("max_area_m2", max_area_m2,
+      "there is no tour where the box around the area is larger: time and memory grow faster than "
+      "it");
     f("corner_cut_m", corner_cut_m, "how far it leaves a corner to round it");
+    f("looks", looks,
+      "it begins anew with other viewpoints, for the shortest of the tours, until it has looked "
+      "around from so many places");
     f("perturbations", perturbations, "of the order of its viewpoints, each improved again");
     f.check(area_share > 0 && area_share <= 1, "0 < area_share <= 1");
     f.check(range_m >= 0.5 && range_m <= 100, "0.5 <= range_m <= 100");
@@ -41,7 +49,9 @@ struct OmniscientTourConfig {
             "0.5 <= viewpoint_spacing_m <= 100");
     f.check(sight_step_m >= 0.2 && sight_step_m <= 100, "0.2 <= sight_step_m <= 100");
     f.check(resolution_m >= 0.05 && resolution_m <= 2, "0.05 <= resolution_m <= 2");
+    f.check(max_area_m2 >= 0, "max_area_m2 >= 0");
     f.check(corner_cut_m >= 0.01 && corner_cut_m <= 2, "0.01 <= corner_cut_m <= 2");
+    f.check(looks >= 0 && looks <= 1000000, "0 <= looks <= 1000000");
     f.check(perturbations >= 0 && perturbations <= 100000, "0 <= perturbations <= 100000");
   }
 };
@@ -79,18 +89,18 @@ struct OmniscientTour {
 /// of them show is covered; a short tour through these (FlightWays, order_tour). What is seen on
 /// the way between them counts as well. So viewpoints that the rest of the tour makes needless are
 /// dropped, and the others moved to where the way is shorter, as long as the tour still sees its
-/// share. Start, entry and landing are the mission's. Time is that of flight_time.
+/// share; all that from several covers, and the shortest tour counts. Start, entry and landing are
+/// the mission's. Time is that of flight_time.
 ///
 /// Cover, tour and moves are heuristic: the tour is one that can be flown, an upper bound of the
 /// shortest, not a lower bound of all. On the other hand its sensor misses nothing in range and
 /// line of sight. It is a measure to hold flights against, not a proof that none does better.
 /// Source: Gonzalez-Banos and Latombe, A randomized art-gallery algorithm for sensor placement,
-/// 2001 (viewpoints by greedy cover, seen through a tour); Cao et al., TARE, RSS 2021 (tours
-/// through viewpoints that cover what is left).
+/// 2001 (viewpoints by greedy cover); Cao et al., TARE, RSS 2021 (a tour through viewpoints).
 ///
 /// @param X_WO O in W; level
 /// @param area_cells_W what CoverageScorer counts the area by
-/// @return nothing if there is no area, or the vehicle does not fit where it starts
+/// @return nothing if there is no area, too much of it, or no room where it starts
 std::optional<OmniscientTour> plan_omniscient_tour(const OmniscientTourConfig& config,
                                                    const worlds::World& world, const Pose& X_WO,
                                                    const ScoredRegion& region,

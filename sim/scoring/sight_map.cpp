@@ -1,35 +1,44 @@
 #include "scoring/sight_map.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
+#include "mapping/line_walk.h"
 #include "worlds/occupancy.h"
 
 namespace arex::sim {
 
-using worlds::SurfaceClass;
+namespace {
+
+constexpr std::size_t kWord = 64;
+
+void set_bit(SightMap::Bits& bits, std::size_t patch) {
+  bits[patch / kWord] |= std::uint64_t{1} << (patch % kWord);
+}
+
+}  // namespace
 
 SightMap::SightMap(const worlds::World& world, std::span<const Vec3f> area_cells_W, double range_m,
                    double slab_m) {
   place(area_cells_W, range_m);
   find_opaque(world, heights(area_cells_W), slab_m);
-  number_patches(area_cells_W);
   lay_rays(range_m);
 }
 
 void SightMap::place(std::span<const Vec3f> area_cells_W, double range_m) {
   Eigen::AlignedBox2d box;
   for (const Vec3f& cell : area_cells_W) box.extend(cell.head<2>().cast<double>());
-  // On multiples of a patch, as the map's cells are.
   const double side = kPatch * kColumn_m;
   low_ = side * (box.min() / side).array().floor();
-  size_ = column_of(box.max()) + Eigen::Vector2i::Ones();
-  steps_ = static_cast<std::size_t>(std::lround(range_m / kColumn_m));
-  rim_ = static_cast<int>(steps_) + 1;
+  size_ = kPatch * (column_of(box.max()) / kPatch + Eigen::Vector2i::Ones());
+  rim_ = static_cast<int>(std::ceil(range_m / kColumn_m)) + 1;
+  const auto patches = static_cast<std::size_t>(size_.prod() / (kPatch * kPatch));
+  area_.assign((patches + kWord - 1) / kWord, 0);
+  for (const Vec3f& cell : area_cells_W) set_bit(area_, patch(cell.head<2>().cast<double>()));
 }
 
 Eigen::Vector2i SightMap::column_of(const Vec2& p_W) const {
@@ -40,10 +49,16 @@ bool SightMap::in_box(const Eigen::Vector2i& column) const {
   return (column.array() >= 0).all() && (column.array() < size_.array()).all();
 }
 
-std::size_t SightMap::index(const Eigen::Vector2i& column) const {
+std::size_t SightMap::column_index(const Eigen::Vector2i& column) const {
   return static_cast<std::size_t>(column.y() + rim_) *
              static_cast<std::size_t>(size_.x() + 2 * rim_) +
          static_cast<std::size_t>(column.x() + rim_);
+}
+
+std::size_t SightMap::patch_index(const Eigen::Vector2i& column) const {
+  return static_cast<std::size_t>(column.y() / kPatch) *
+             static_cast<std::size_t>(size_.x() / kPatch) +
+         static_cast<std::size_t>(column.x() / kPatch);
 }
 
 // The area's own, and outwards from it over the sides of columns.
@@ -79,10 +94,10 @@ void SightMap::find_opaque(const worlds::World& world, const std::vector<float>&
   const worlds::Bounds box{{low_.x(), low_.y(), static_cast<double>(lowest) - 0.5 * slab_m},
                            {high.x(), high.y(), static_cast<double>(highest) + 0.5 * slab_m}};
   const auto occupancy = voxelize(world, worlds::make_grid(box, kColumn_m),
-                                  worlds::ClassSet::all().without(SurfaceClass::kLeaf));
+                                  worlds::ClassSet::all().without(worlds::SurfaceClass::kLeaf));
   const auto columns = static_cast<std::size_t>(size_.x() + 2 * rim_) *
                        static_cast<std::size_t>(size_.y() + 2 * rim_);
-  column_.assign(columns, kOpaque);
+  opaque_.assign(columns, 1);
   const int layers = std::max(1, static_cast<int>(std::lround(slab_m / kColumn_m)));
   std::size_t at = 0;
   for (int y = 0; y < size_.y(); ++y) {
@@ -94,74 +109,64 @@ void SightMap::find_opaque(const worlds::World& world, const std::vector<float>&
       for (int k = 0; k < layers; ++k, ++cell.z()) {
         filled += occupancy.grid.contains(cell) && occupancy.at(cell);
       }
-      if (2 * filled < layers) column_[index({x, y})] = kNoPatch;
+      opaque_[column_index({x, y})] = 2 * filled >= layers;
     }
-  }
-}
-
-void SightMap::number_patches(std::span<const Vec3f> area_cells_W) {
-  for (const Vec3f& cell : area_cells_W) {
-    const Eigen::Vector2i own = column_of(cell.head<2>().cast<double>());
-    std::array<std::size_t, kPatch * kPatch> square{};
-    for (int i = 0; i < kPatch * kPatch; ++i) {
-      square[static_cast<std::size_t>(i)] =
-          index(own / kPatch * kPatch + Eigen::Vector2i(i % kPatch, i / kPatch));
-    }
-    std::int32_t patch = kNoPatch;
-    for (const std::size_t at : square) patch = std::max(patch, column_[at]);
-    if (patch == kNoPatch) patch = static_cast<std::int32_t>(patches_++);
-    for (const std::size_t at : square) {
-      if (column_[at] == kNoPatch) column_[at] = patch;
-    }
-    column_[index(own)] = patch;  // the vehicle fits there, at some height
   }
 }
 
 void SightMap::lay_rays(double range_m) {
   const int rays =
       static_cast<int>(std::ceil(2 * std::numbers::pi * range_m / (kPatch * kColumn_m)));
-  const std::int32_t row = size_.x() + 2 * rim_;
+  OccupancyMap2D columns;  // column (0, 0) has its middle at the origin
+  columns.origin = Vec2::Constant(-0.5 * kColumn_m);
+  columns.resolution = kColumn_m;
+  const auto patches_off = [](int columns_off) {  // rounded down, as the start is a patch's first
+    return (columns_off - (columns_off < 0 ? kPatch - 1 : 0)) / kPatch;
+  };
   for (int r = 0; r < rays; ++r) {
     const double angle = 2 * std::numbers::pi * r / rays;
-    const Vec2 direction(std::cos(angle), std::sin(angle));
-    for (std::size_t s = 1; s <= steps_; ++s) {
-      const Vec2 p = static_cast<double>(s) * direction;
-      rays_.push_back(static_cast<std::int32_t>(std::lround(p.y())) * row +
-                      static_cast<std::int32_t>(std::lround(p.x())));
-    }
+    const Vec2 end = range_m * Vec2(std::cos(angle), std::sin(angle));
+    walk_line(columns, Vec2::Zero(), end, [&](const Eigen::Vector2i& c) {
+      steps_.push_back({c.y() * (size_.x() + 2 * rim_) + c.x(),
+                        patches_off(c.y()) * (size_.x() / kPatch) + patches_off(c.x())});
+      return true;
+    });
+    ray_ends_.push_back(steps_.size());
   }
 }
 
 SightMap::Bits SightMap::seen_from(const Vec2& p_W) const {
-  constexpr std::size_t kWord = 64;
-  Bits seen((patches_ + kWord - 1) / kWord, 0);
+  Bits seen(area_.size(), 0);
   const Eigen::Vector2i column = column_of(p_W);
   if (!in_box(column)) return seen;
-  const auto mark = [&](std::int32_t patch) {
-    if (patch < 0) return;
-    seen[static_cast<std::size_t>(patch) / kWord] |= std::uint64_t{1}
-                                                     << (static_cast<std::size_t>(patch) % kWord);
-  };
-  const std::size_t start = index(column);
-  mark(column_[start]);
-  for (std::size_t ray = 0; ray < rays_.size(); ray += steps_) {
-    for (std::size_t s = 0; s < steps_; ++s) {
-      const std::size_t at =
-          start + static_cast<std::size_t>(static_cast<std::ptrdiff_t>(rays_[ray + s]));
-      if (column_[at] == kOpaque) break;
-      mark(column_[at]);
+  const Eigen::Vector2i start = column / kPatch * kPatch;
+  const std::uint8_t* const opaque = &opaque_[column_index(start)];
+  const auto patch = static_cast<std::ptrdiff_t>(patch_index(start));
+  std::size_t step = 0;
+  for (const std::size_t end : ray_ends_) {
+    for (; step < end && !opaque[steps_[step].column]; ++step) {
+      set_bit(seen, static_cast<std::size_t>(patch + steps_[step].patch));
     }
+    step = end;
   }
+  for (std::size_t i = 0; i < seen.size(); ++i) seen[i] &= area_[i];
   return seen;
 }
 
-std::int32_t SightMap::at(const Vec2& p_W) const {
-  const Eigen::Vector2i column = column_of(p_W);
-  return in_box(column) ? column_[index(column)] : kOpaque;
+Vec2 SightMap::origin_W(const Vec2& p_W) const {
+  const Eigen::Vector2i start = column_of(p_W) / kPatch * kPatch;
+  return low_ + kColumn_m * (start.cast<double>() + Vec2::Constant(0.5));
 }
 
-Vec2 SightMap::middle_W(const Vec2& p_W) const {
-  return low_ + kColumn_m * (column_of(p_W).cast<double>() + Vec2::Constant(0.5));
+bool SightMap::is_opaque(const Vec2& p_W) const {
+  const Eigen::Vector2i column = column_of(p_W);
+  return !in_box(column) || opaque_[column_index(column)] != 0;
+}
+
+std::size_t SightMap::patch(const Vec2& p_W) const { return patch_index(column_of(p_W)); }
+
+bool has_bit(const SightMap::Bits& bits, std::size_t patch) {
+  return (bits[patch / kWord] >> (patch % kWord) & 1) != 0;
 }
 
 std::size_t count_bits(const SightMap::Bits& bits) {

@@ -18,11 +18,11 @@ namespace arex::sim {
 /// the nearest that is. The area is counted in square patches with cells of it; a patch is seen
 /// when a ray passes through it, which makes it known to the exploration's 2D map as free.
 ///
-/// Rays stand at angles so close that the farthest patch is not missed; each is walked in steps of
-/// a column's side, which no closed surface lets through, for voxels of a surface share faces.
+/// Rays stand at angles so close that the farthest patch is not missed; each is walked through
+/// every column that it touches. The walks are worked out once, for all places.
 class SightMap {
  public:
-  /// One bit for each patch of the area.
+  /// One bit for each patch of the box around the area, set only where there is area.
   using Bits = std::vector<std::uint64_t>;
 
   /// @param area_cells_W middles of the area's cells, z where sight is asked for, m; not empty
@@ -30,37 +30,43 @@ class SightMap {
   SightMap(const worlds::World& world, std::span<const Vec3f> area_cells_W, double range_m,
            double slab_m);
 
-  [[nodiscard]] std::size_t patches() const { return patches_; }
-  /// The patches seen from a place inside the box around the area; from outside nothing is.
+  /// All patches of the area.
+  [[nodiscard]] const Bits& area() const { return area_; }
+  /// Those seen from a place inside the box around the area; from outside nothing is.
   [[nodiscard]] Bits seen_from(const Vec2& p_W) const;
-  /// What stands at a place: a patch's number, kNoPatch or kOpaque; kOpaque outside the box.
-  [[nodiscard]] std::int32_t at(const Vec2& p_W) const;
-  /// The middle of the column that holds a place.
-  [[nodiscard]] Vec2 middle_W(const Vec2& p_W) const;
 
-  static constexpr std::int32_t kNoPatch = -1;
-  static constexpr std::int32_t kOpaque = -2;
+  /// Where the rays of a place start: the middle of the first column of its patch.
+  [[nodiscard]] Vec2 origin_W(const Vec2& p_W) const;
+  /// Outside the box everything is.
+  [[nodiscard]] bool is_opaque(const Vec2& p_W) const;
+  /// The bit of the patch that holds a place. @pre the place is in the box
+  [[nodiscard]] std::size_t patch(const Vec2& p_W) const;
 
   static constexpr double kColumn_m = 0.1;  ///< side of a column: the exploration map's resolution
   static constexpr int kPatch = 2;          ///< columns along a patch's side
 
  private:
+  /// Of a ray, from the column that it starts in.
+  struct Step {
+    std::int32_t column;  ///< how much further its index is
+    std::int32_t patch;   ///< and that of its patch
+  };
   void place(std::span<const Vec3f> area_cells_W, double range_m);
   [[nodiscard]] std::vector<float> heights(std::span<const Vec3f> area_cells_W) const;
   void find_opaque(const worlds::World& world, const std::vector<float>& heights, double slab_m);
-  void number_patches(std::span<const Vec3f> area_cells_W);
   void lay_rays(double range_m);
   [[nodiscard]] Eigen::Vector2i column_of(const Vec2& p_W) const;
   [[nodiscard]] bool in_box(const Eigen::Vector2i& column) const;
-  [[nodiscard]] std::size_t index(const Eigen::Vector2i& column) const;
+  [[nodiscard]] std::size_t column_index(const Eigen::Vector2i& column) const;
+  [[nodiscard]] std::size_t patch_index(const Eigen::Vector2i& column) const;
 
-  Vec2 low_;              ///< of column (0, 0)
-  Eigen::Vector2i size_;  ///< columns of the box around the area
-  int rim_ = 0;           ///< opaque columns around it, so that no ray leaves the tables
-  std::vector<std::int32_t> column_;  ///< its patch, kNoPatch or kOpaque
-  std::size_t patches_ = 0;
-  std::size_t steps_ = 0;           ///< of a ray
-  std::vector<std::int32_t> rays_;  ///< steps_ each: offset of the index from where it starts
+  Vec2 low_;                          ///< of column (0, 0), on multiples of a patch
+  Eigen::Vector2i size_;              ///< columns of the box around the area, whole patches
+  int rim_ = 0;                       ///< opaque columns around it: no ray leaves the table
+  std::vector<std::uint8_t> opaque_;  ///< columns, the rim included; x runs fastest
+  Bits area_;
+  std::vector<Step> steps_;            ///< ray by ray
+  std::vector<std::size_t> ray_ends_;  ///< one past each ray's last step
 };
 
 /// How many patches there are in `bits`, and how many that are not in `known`.
@@ -68,5 +74,6 @@ class SightMap {
 [[nodiscard]] std::size_t count_new(const SightMap::Bits& known, const SightMap::Bits& bits);
 /// Adds those of `bits` to `known`.
 void add_bits(SightMap::Bits& known, const SightMap::Bits& bits);
+[[nodiscard]] bool has_bit(const SightMap::Bits& bits, std::size_t patch);
 
 }  // namespace arex::sim

@@ -139,7 +139,10 @@ WorldComplexity measure_complexity(const WorldComplexityConfig& config, const Wo
   const AreaMask area(area_cells_W, cell_m);
   const Pose X_OW = X_WO.inverse();
   const std::vector<Vec3> directions = horizontal_directions(config.directions);
-  const int stride = std::max(1, static_cast<int>(std::lround(config.spacing_m / cell_m)));
+  constexpr double kMostPlaces = 10000;  // of a large area; enough for a mean
+  const double spacing_m = std::max(
+      config.spacing_m, cell_m * std::sqrt(static_cast<double>(area_cells_W.size()) / kMostPlaces));
+  const int stride = std::max(1, static_cast<int>(std::lround(spacing_m / cell_m)));
   const int steps = static_cast<int>(std::lround(config.range_m / cell_m));
   FreeWays sight, flight;
   for (const Vec3f& cell : area_cells_W) {

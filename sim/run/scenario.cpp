@@ -121,6 +121,10 @@ double ScenarioConfig::mapped_frames_hz() const {
   return frames;
 }
 
+ScoredRegion ScenarioConfig::scored_region() const {
+  return {stack.exploration.explorer.bounds, scoring.low_m, scoring.high_m, stack.explored_from()};
+}
+
 std::string Scenario::resolved_yaml() const { return write_yaml(list_parameters(config)); }
 
 std::shared_ptr<const worlds::FileWorld> Scenario::read_file_world() const {
@@ -149,11 +153,6 @@ worlds::World Scenario::build_world() const {
     config_detail::fail(config_detail::locate_rule(source, rule), "expected " + rule);
   }
   return world;
-}
-
-ScoredRegion Scenario::scored_region() const {
-  return {config.stack.exploration.explorer.bounds, config.scoring.low_m, config.scoring.high_m,
-          config.stack.explored_from()};
 }
 
 Pose start_pose(const worlds::World& world) {
@@ -202,6 +201,7 @@ void derive(ScenarioConfig asked, const worlds::FileWorld* file_world, ScenarioC
   coverage.band_low_m = map.band_low_m;
   coverage.band_high_m = map.band_high_m;
   coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;
+  config.scoring.tour.range_m = map.range_m;
   for (const auto& [name, device] : asked.devices) {
     config.stack.vehicle.mounts[name] = device.mount;
   }

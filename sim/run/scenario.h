@@ -16,8 +16,10 @@
 #include "run/operator_link.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
+#include "scoring/omniscient_tour.h"
 #include "scoring/semantic_score.h"
 #include "scoring/thin_branches.h"
+#include "scoring/world_complexity.h"
 #include "semantics/pcl_models.h"
 #include "semantics/semantic_config.h"
 #include "sensors/imu.h"
@@ -35,6 +37,8 @@ struct ScoringConfig {
   MapErrorConfig map;
   ThinBranchConfig thin;
   SemanticScoreConfig semantic;
+  OmniscientTourConfig tour;
+  WorldComplexityConfig complexity;
 
   void fields(auto& f) {
     f("low_m", low_m, "lower edge of the space that counts as reachable, z in O");
@@ -43,6 +47,8 @@ struct ScoringConfig {
     f("map", map, "distance of the map from the true surfaces");
     f("thin", thin, "thin branches seen in time");
     f("semantic", semantic, "the semantic map against the world");
+    f("tour", tour, "the tour of somebody who knows the world");
+    f("complexity", complexity, "how hard the world is to see and to fly through");
     f.check(low_m < high_m, "low_m < high_m");
   }
 };
@@ -121,6 +127,8 @@ struct ScenarioConfig {
   }
   /// Frames that the maps take, of all devices.
   [[nodiscard]] double mapped_frames_hz() const;
+  /// What an exploration is scored over: what it is told to explore.
+  [[nodiscard]] ScoredRegion scored_region() const;
 };
 
 /// A scenario as it was asked for.
@@ -139,8 +147,7 @@ struct Scenario {
   [[nodiscard]] worlds::World build_world() const;
   /// The world of kind file as it was understood. @throws ConfigError at the line of `world`.
   [[nodiscard]] std::shared_ptr<const worlds::FileWorld> read_file_world() const;
-  /// What an exploration is scored over: what it is told to explore.
-  [[nodiscard]] ScoredRegion scored_region() const;
+  [[nodiscard]] ScoredRegion scored_region() const { return config.scored_region(); }
 };
 
 /// Where B stands at the start: on its legs on the pad. Also the pose of O as it should be.

@@ -30,6 +30,16 @@ StoppingModel stopping_of(const StackConfig& stack) {
           planning.local.reaction_s + planning.replan.planning_latency_s};
 }
 
+/// What the omniscient tour has in common with the mission.
+TourMission tour_mission_of(const StackConfig& stack) {
+  const MissionConfig& mission = stack.mission;
+  return {mission.takeoff_height_m,
+          mission.entry_m,
+          mission.land_at_start != MissionConfig::LandAtStart::kFalse,
+          {stack.planning.local.max_speed_mps, stack.planning.local.max_acceleration_mps2,
+           stack.path.climb_speed_mps, stack.path.landing_speed_mps}};
+}
+
 }  // namespace
 
 void ExplorationLog::add(const Decision& decision) {
@@ -283,6 +293,21 @@ SemanticScore Simulation::map_semantics(const std::vector<Vec3f>& cloud_O,
   return score_semantics(map, cloud_O, align_map(poses), world_, config_.scoring.semantic);
 }
 
+// Depends on world and mission alone, on nothing that was flown.
+void Simulation::compare_with_the_possible(FlightResult& result) {
+  const StageTimer::Scope timed(timers_.tour);
+  const ScoredRegion region = config_.scored_region();
+  const Pose X_WO = start_pose(world_);
+  const double radius_m = physics_.airframe().radius_m;
+  const std::vector<Vec3f>& area = coverage_->area_cells_W();
+  result.complexity =
+      measure_complexity(config_.scoring.complexity, world_, scene_, X_WO, region, area,
+                         config_.scoring.coverage.space.resolution_m, radius_m);
+  if (!config_.scoring.tour.enabled) return;
+  result.tour = plan_omniscient_tour(config_.scoring.tour, world_, X_WO, region, radius_m, area,
+                                     tour_mission_of(config_.stack));
+}
+
 FlightResult Simulation::finish() {
   jobs_.drain();
   FlightResult result;
@@ -312,7 +337,10 @@ FlightResult Simulation::finish() {
       result.semantic = map_semantics(cloud, result.flight.poses);
     }
   }
-  if (coverage_) result.coverage = coverage_->result();
+  if (coverage_) {
+    result.coverage = coverage_->result();
+    compare_with_the_possible(result);
+  }
   result.exploration = exploration_;
   result.plans = view.plans;
   if (recorder_ && config_.stack.mapping.enabled) {
@@ -320,8 +348,9 @@ FlightResult Simulation::finish() {
   }
   result.battery = physics_.battery();
   if (result.device_hashes.contains("depth")) result.renderer = Renderer::kName;
-  for (const StageTimer* timer : {&timers_.devices, &timers_.stack, &timers_.autopilot,
-                                  &timers_.physics, &timers_.recording, &timers_.semantics}) {
+  for (const StageTimer* timer :
+       {&timers_.devices, &timers_.stack, &timers_.autopilot, &timers_.physics, &timers_.recording,
+        &timers_.semantics, &timers_.tour}) {
     result.timing.push_back(timing_row(timer->name(), timer->seconds()));
   }
   for (const auto& lane : jobs_.timings()) {

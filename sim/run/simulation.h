@@ -16,7 +16,9 @@
 #include "run/stage_timer.h"
 #include "scoring/flight_scorer.h"
 #include "scoring/map_error.h"
+#include "scoring/omniscient_tour.h"
 #include "scoring/semantic_score.h"
+#include "scoring/world_complexity.h"
 #include "sensors/device.h"
 #include "sensors/scene.h"
 #include "stack/flight_software.h"
@@ -59,9 +61,11 @@ struct FlightResult {
   int collisions = 0;
   std::vector<MissionTarget> targets;
   FlightScore flight;
-  std::optional<MapScore> map;             ///< nothing without a map
-  std::optional<CoverageResult> coverage;  ///< of explorations
-  std::optional<SemanticScore> semantic;   ///< of explorations that make a semantic map
+  std::optional<MapScore> map;                ///< nothing without a map
+  std::optional<CoverageResult> coverage;     ///< of explorations
+  std::optional<SemanticScore> semantic;      ///< of explorations that make a semantic map
+  std::optional<OmniscientTour> tour;         ///< of explorations, where scoring.tour is enabled
+  std::optional<WorldComplexity> complexity;  ///< of explorations
   ExplorationLog exploration;
   PlanCounts plans;
   BatteryState battery;
@@ -112,12 +116,13 @@ class Simulation {
   void write_cloud();
   void note_cloud_growth();
   void score_coverage();
+  void compare_with_the_possible(FlightResult& result);
   [[nodiscard]] SemanticScore map_semantics(const std::vector<Vec3f>& cloud_O,
                                             const std::vector<PosePair>& poses) const;
 
   struct Timers {
     StageTimer devices{"devices"}, stack{"stack"}, autopilot{"autopilot"}, physics{"physics"},
-        recording{"recording"}, semantics{"semantics"};
+        recording{"recording"}, semantics{"semantics"}, tour{"tour"};
   };
 
   ScenarioConfig config_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #ifndef AREX_VERSION
@@ -15,7 +16,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* kPlannerModule = "replan";  // its row of timing.csv
+// Rows of timing.csv.
+constexpr const char* kPlannerModule = "replan";
+constexpr const char* kExplorerModule = "exploration";
 
 std::vector<Figures::Item> targets_of(const FlightResult& result) {
   std::vector<Figures::Item> targets;
@@ -72,6 +75,15 @@ void add_flight(const FlightScore& flight, Figures& figures) {
   if (flight.thin) add_figures(*flight.thin, figures);
 }
 
+void add_timing(const FlightResult& result, const std::string& module, const std::string& section,
+                Figures& figures) {
+  for (const TimingRow& row : result.timing) {
+    if (row.module != module) continue;
+    figures.set(section + ".median_ms", row.median_ms);
+    figures.set(section + ".p99_ms", row.p99_ms);
+  }
+}
+
 void add_planner(const FlightResult& result, Figures& figures) {
   if (result.plans.plans == 0) return;
   figures.set("planner.replans", result.plans.plans);
@@ -82,11 +94,18 @@ void add_planner(const FlightResult& result, Figures& figures) {
     figures.set("planner.stages." + std::string(kPlanStageNames[stage]),
                 result.plans.stages[stage]);
   }
-  for (const TimingRow& row : result.timing) {
-    if (row.module != kPlannerModule) continue;
-    figures.set("planner.median_ms", row.median_ms);
-    figures.set("planner.p99_ms", row.p99_ms);
-  }
+  add_timing(result, kPlannerModule, "planner", figures);
+}
+
+// Of explorations: what was possible, and how near the flight came to it. One that failed has no
+// ratio: it is short because it ended early.
+void add_tour(const FlightResult& result, Figures& figures) {
+  if (result.complexity) add_figures(*result.complexity, figures);
+  if (!result.tour) return;
+  const bool succeeded = result.outcome == Outcome::kSucceeded;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  add_figures(*result.tour, succeeded ? result.flight.distance_m : kNone,
+              succeeded ? to_seconds(result.duration) : kNone, figures);
 }
 
 void flatten_into(const ordered_json& value, const std::string& key,
@@ -115,6 +134,8 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   if (result.coverage) add_figures(*result.coverage, figures);
   if (result.semantic) add_figures(*result.semantic, figures);
   result.exploration.add_figures(figures);
+  add_timing(result, kExplorerModule, "exploration", figures);
+  add_tour(result, figures);
   return figures.json();
 }
 

@@ -223,8 +223,12 @@ void add_figures(const CoverageResult& coverage, Figures& figures) {
   figures.set("coverage.heading_change_radpm", coverage.heading_change_radpm);
   figures.set("coverage.reachable_area_m2", coverage.area_m2);
   figures.set("coverage.surface_samples", coverage.surface_samples);
-  const double flown = coverage.rows.empty() ? 0 : coverage.rows.back().distance_m;
-  figures.set("coverage.area_m2_per_m", coverage.area_fraction * coverage.area_m2 / flown);
+  const CoverageRow last = coverage.rows.empty() ? CoverageRow() : coverage.rows.back();
+  const double area = coverage.area_fraction * coverage.area_m2;
+  figures.set("coverage.area_m2_per_m", area / last.distance_m);
+  figures.set("coverage.area_m2_per_s", area / to_seconds(last.stamp));
+  figures.set("coverage.volume_m3_per_m", coverage.volume_m3 / last.distance_m);
+  figures.set("coverage.volume_m3_per_s", coverage.volume_m3 / to_seconds(last.stamp));
   for (std::size_t i = 0; i < coverage.classes.size(); ++i) {
     const ClassCoverage& c = coverage.classes[i];
     const std::string name(worlds::kSurfaceClassNames[i]);

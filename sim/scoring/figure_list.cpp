@@ -66,6 +66,12 @@ std::vector<FigureInfo> coverage_figures() {
        "sum of the course's changes over the path's length; null without a path"},
       {"coverage.area_m2_per_m", "area covered per metre flown", "m^2/m", kMore, false,
        "of the reachable area, up to the last score; null without a path"},
+      {"coverage.area_m2_per_s", "area covered per second", "m^2/s", kMore, false,
+       "the same over the time from the start of the run"},
+      {"coverage.volume_m3_per_m", "free volume mapped per metre flown", "m^3/m", kMore, false,
+       "of the 3D map's free cells, up to the last score; null without a path"},
+      {"coverage.volume_m3_per_s", "free volume mapped per second", "m^3/s", kMore, false,
+       "the same over the time from the start of the run"},
       {"coverage.reachable_area_m2", "reachable area", "m^2", kNeither, false,
        "what area_fraction is a share of"},
       {"coverage.surface_samples", "visible surface samples", "", kNeither, false,
@@ -103,6 +109,39 @@ std::vector<FigureInfo> exploration_figures() {
       {"exploration.open_frontier_m2", "largest frontier left", "m^2", kLess, false,
        "unknown area at the largest frontier that the exhaustive search still reaches at the "
        "stop; null unless it stopped for want of candidates"},
+      {"exploration.omniscient_ratio", "path over the omniscient tour's", "1", kLess, false,
+       "the same as tour.path_ratio"},
+      {"exploration.median_ms", "time of a decision, median", "ms", kNeither, false, "of the host",
+       Kind::kNumber, true},
+      {"exploration.p99_ms", "time of a decision, 99th percentile", "ms", kNeither, false,
+       "of the host", Kind::kNumber, true},
+  };
+}
+
+// What was possible, and how hard the world is; of explorations.
+std::vector<FigureInfo> tour_figures() {
+  return {
+      {"tour.path_ratio", "path over the omniscient tour's", "1", kLess, true,
+       "distance_m over tour.path_m; null unless the flight succeeded and there is a tour"},
+      {"tour.time_ratio", "time over the omniscient tour's", "1", kLess, true,
+       "sim_time_s over tour.time_s; likewise"},
+      {"tour.path_m", "omniscient tour's path", "m", kNeither, false,
+       "on which whoever knows the world sees scoring.tour.area_share of what can be covered, from "
+       "take-off to landing; a good one, not proven shortest; null: scoring.tour.enabled is false, "
+       "or the area above scoring.tour.max_area_m2"},
+      {"tour.time_s", "omniscient tour's time", "s", kNeither, false,
+       "along it at the planner's limits of speed and acceleration"},
+      {"tour.viewpoints", "omniscient tour's viewpoints", "", kNeither, false,
+       "places that it is led through"},
+      {"tour.area_fraction", "area that the omniscient tour covers", "1", kNeither, false,
+       "by line of sight, in the way of coverage.area_fraction"},
+      {"world.stems_per_m2", "stems per square metre", "1/m^2", kNeither, false,
+       "trunks that stand inside the exploration's bounds; null in a world without any"},
+      {"world.mean_free_path_m", "mean free path", "m", kNeither, false,
+       "of horizontal lines of sight in the area: their length over the number that met "
+       "something; null if none did"},
+      {"world.traversability", "traversability", "", kNeither, false,
+       "mean straight flight in the area until the vehicle fits no more, in radii of the vehicle"},
   };
 }
 
@@ -390,7 +429,7 @@ std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
 
 const std::vector<FigureInfo>& figure_list() {
   static const auto list = joined<FigureInfo>(
-      {run_figures(), coverage_figures(), exploration_figures(), map_figures(),
+      {run_figures(), coverage_figures(), exploration_figures(), tour_figures(), map_figures(),
        odometry_source_figures(), odometry_figures("odometry.", true),
        odometry_figures("odometries.NAME.", false), semantic_figures(), flight_figures()});
   return list;

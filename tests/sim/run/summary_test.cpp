@@ -60,6 +60,32 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
   EXPECT_EQ(with_value(summarise(scenario, result, {1, 1})), counts);
 }
 
+// What was possible is said of every exploration; how near the flight came to it, of one that
+// succeeded.
+TEST(Summary, OnlyAnExplorationThatSucceededHasARatio) {
+  FlightResult result;
+  result.duration = 30 * kNanosecondsPerSecond;
+  result.flight.distance_m = 100;
+  result.tour.emplace();
+  result.tour->path_m = 40;
+  result.tour->time_s = 20;
+  result.complexity.emplace();
+  result.complexity->mean_free_path_m = 12;
+  result.timing = {timing_row("exploration", std::vector<float>{0.5F})};
+  for (const Outcome outcome : {Outcome::kSucceeded, Outcome::kCollided, Outcome::kStuck}) {
+    result.outcome = outcome;
+    const ordered_json summary = summarise({}, result, {1, 1});
+    const bool succeeded = outcome == Outcome::kSucceeded;
+    EXPECT_EQ(summary["tour"]["path_ratio"], succeeded ? ordered_json(2.5) : ordered_json());
+    EXPECT_EQ(summary["tour"]["time_ratio"], succeeded ? ordered_json(1.5) : ordered_json());
+    EXPECT_EQ(summary["tour"]["path_m"], 40.0);
+    EXPECT_EQ(summary["world"]["mean_free_path_m"], 12.0);
+    EXPECT_EQ(summary["exploration"]["median_ms"], 500.0);
+  }
+  EXPECT_TRUE(depends_on_host("exploration.median_ms"));
+  EXPECT_FALSE(depends_on_host("tour.time_s"));
+}
+
 TEST(Summary, HasEveryFigureOfTheListAndNoOther) {
   ordered_json summary = summarise({}, {}, {});
   const auto sections = [&](std::string_view key) { return key.substr(0, key.find('.')); };

@@ -94,13 +94,20 @@ TEST(CoverageScorer, NothingMappedIsZeroAndEverythingIsOne) {
   EXPECT_EQ(result.surface_fraction, 1);
   EXPECT_EQ(result.volume_m3, 7);
   EXPECT_EQ(result.t95_s, 1.0);
-  // 5.2 m x 3.2 m for two metres of path.
+  // 5.2 m x 3.2 m and 7 m3 for two metres of path, in one second.
   Figures figures;
   add_figures(result, figures);
-  EXPECT_NEAR(figures.json()["coverage"]["area_m2_per_m"].get<double>(), 5.2 * 3.2 / 2, 1e-6);
+  const auto coverage = figures.json()["coverage"];
+  EXPECT_NEAR(coverage["area_m2_per_m"].get<double>(), 5.2 * 3.2 / 2, 1e-6);
+  EXPECT_NEAR(coverage["area_m2_per_s"].get<double>(), 5.2 * 3.2, 1e-6);
+  EXPECT_NEAR(coverage["volume_m3_per_m"].get<double>(), 7.0 / 2, 1e-6);
+  EXPECT_NEAR(coverage["volume_m3_per_s"].get<double>(), 7.0, 1e-6);
   Figures unflown;
   add_figures(CoverageResult(), unflown);
-  EXPECT_TRUE(unflown.json()["coverage"]["area_m2_per_m"].is_null());
+  for (const char* rate :
+       {"area_m2_per_m", "area_m2_per_s", "volume_m3_per_m", "volume_m3_per_s"}) {
+    EXPECT_TRUE(unflown.json()["coverage"][rate].is_null()) << rate;
+  }
   EXPECT_EQ(write_coverage_csv(result.rows),
             "time_s,distance_m,area_fraction,surface_fraction,volume_m3\n"
             "0.000,0.000,0.00000,0.00000,0.000\n1.000,2.000,1.00000,1.00000,7.000\n");

@@ -7,8 +7,12 @@
 namespace arex {
 namespace {
 
-/// Of a reading that is held while the vehicle goes on, m/s^2/sqrt(Hz).
-constexpr double kHeldAccelNoise = 1;
+/// So fast a reading that is held while the vehicle goes on grows wrong: rad/s^2, m/s^3.
+constexpr double kHeldRateDrift = 10, kHeldForceDrift = 30;
+
+/// The density of white noise whose integral over `dt` scatters as that of an error which grows by
+/// `drift` from zero on.
+double held_noise(double drift, double dt) { return 0.5 * drift * dt * std::sqrt(dt); }
 
 using PoseColumns = Eigen::Matrix<double, kErrorDim, PoseInformation::kDim>;
 /// First index in the error state of each block of a PoseInformation.
@@ -63,13 +67,16 @@ void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
   if (standing) jacobians.F.col(kTimeOffset).head<kTimeOffset>().setZero();
   Eigen::Matrix<double, kNoiseDim, 1> Q;
   const Vec3 rate = x_.rate(imu.mean_gyro());
+  const double held = imu.held ? 1 : 0;
   for (int i = 0; i < 3; ++i) {
     const double gyro =
-        imu.held || imu.gyro_clipped[static_cast<std::size_t>(i)]
+        imu.gyro_clipped[static_cast<std::size_t>(i)]
             ? noise_.clipped_gyro_noise_density
-            : std::hypot(noise_.gyro_noise_density, noise_.gyro_scale_noise_density * rate.norm());
+            : std::hypot(noise_.gyro_noise_density, noise_.gyro_scale_noise_density * rate.norm(),
+                         held * held_noise(kHeldRateDrift, dt));
     Q[i] = gyro * gyro / dt;
-    const double accel = imu.held ? kHeldAccelNoise : noise_.accel_noise_density;
+    const double accel =
+        std::hypot(noise_.accel_noise_density, held * held_noise(kHeldForceDrift, dt));
     Q[3 + i] = accel * accel / dt;
     Q[6 + i] = noise_.gyro_walk_density * noise_.gyro_walk_density / dt;
     Q[9 + i] = noise_.accel_walk_density * noise_.accel_walk_density / dt;

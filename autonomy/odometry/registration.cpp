@@ -57,6 +57,19 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
   return sum;
 }
 
+/// Adds the variance of an angle between IMU and LiDAR to that of the residuals' rotation, A^-1:
+/// (A^-1 + J)^-1 = (I + A J)^-1 A, for which A need not be regular.
+PoseInformation with_shaking(const PoseInformation& information, double std_rad) {
+  PoseInformation::Matrix I_AJ = PoseInformation::Matrix::Identity();
+  I_AJ.leftCols<3>() += std_rad * std_rad * information.A.leftCols<3>();
+  const PoseInformation::Matrix inverse = I_AJ.partialPivLu().inverse();
+  PoseInformation shaken;
+  shaken.A = inverse * information.A;
+  shaken.A = (0.5 * (shaken.A + shaken.A.transpose())).eval();
+  shaken.b = inverse * information.b;
+  return shaken;
+}
+
 /// What is left of a block's information once the other block is unknown too, as deviations.
 void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec3& deviations,
                       Vec3& worst_axis) {
@@ -112,17 +125,20 @@ PlaneResidual plane_residual(const NavigationState& x, const ScanPoint& point,
 }
 
 RegistrationReport register_scan(const std::vector<ScanPoint>& points, const SurfelMap& map,
-                                 const LidarInertialConfig& config, ErrorStateFilter& filter) {
+                                 const LidarInertialConfig& config, double shaken_rad,
+                                 ErrorStateFilter& filter) {
   RegistrationReport report;
   report.points = static_cast<int>(points.size());
   const PoseInformation::Matrix P_pose = filter.pose_covariance();
   NavigationState x = filter.state();
   Linearisation at_x;
+  PoseInformation seen;
   for (int i = 0; i < config.registration.max_iterations; ++i) {
     at_x = linearise(points, map, config, x, P_pose);
     ++report.iterations;
     if (at_x.matched < config.health.min_matches) break;
-    const NavigationState next = filter.iterate(x, at_x.information);
+    seen = with_shaking(at_x.information, shaken_rad);
+    const NavigationState next = filter.iterate(x, seen);
     const ErrorVector step = local(x, next);
     x = next;
     if (step.segment<3>(kRotation).norm() < config.registration.converged_rad &&
@@ -149,7 +165,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
     const Eigen::Matrix<double, 6, 1> d = local(filter.state(), x).head<6>();
     const Eigen::Matrix<double, 6, 6> P = P_pose.topLeftCorner<6, 6>();
     report.innovation = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
-    filter.finish(x, at_x.information);
+    filter.finish(x, seen);
   }
   return report;
 }

@@ -42,7 +42,9 @@ PlaneResidual plane_residual(const NavigationState& x, const ScanPoint& point,
                              const SurfelMatch& match, const LidarNoiseConfig& noise);
 
 /// Corrects `filter` with the points if enough of them match.
+/// @param shaken_rad 1 sigma, each axis, of the angle by which the IMU is shaken against the LiDAR
 RegistrationReport register_scan(const std::vector<ScanPoint>& points, const SurfelMap& map,
-                                 const LidarInertialConfig& config, ErrorStateFilter& filter);
+                                 const LidarInertialConfig& config, double shaken_rad,
+                                 ErrorStateFilter& filter);
 
 }  // namespace arex

@@ -79,7 +79,7 @@ std::optional<Relocalisation> refine(const Pose& X_OB, const std::vector<ScanPoi
     const double scale = 1.0 / (1 << i);
     filter.inflate_pose_covariance(0.5 * std::numbers::pi * scale / hc.recovery_yaw_steps,
                                    hc.recovery_step_m * scale, kRecoveryVelocityStd);
-    report = register_scan(points, map, config, filter);
+    report = register_scan(points, map, config, 0, filter);
     if (!report.accepted) return std::nullopt;
   }
   if (report.matched < hc.recovery_fraction * report.points) return std::nullopt;

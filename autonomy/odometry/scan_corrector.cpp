@@ -92,6 +92,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   const Mat3 R_BO = filter_.state().R_OB.transpose();
   update.pose_covariance = filter_.pose_covariance().topLeftCorner<6, 6>();
   update.pose_covariance += turned(map_met_.covariance, R_BO);
+  update.pose_covariance.diagonal().head<3>().array() += shaken_rad_ * shaken_rad_;
   update.imu_noise = {filter_.noise().gyro_noise_density, filter_.noise().accel_noise_density};
   update.accel_scale = accel_scale_;
   update.gyro = gyro_;
@@ -139,7 +140,7 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
   ErrorStateFilter tried = filter_;
   points =
       voxel_downsample(points, config_.registration.scan_voxel_m, config_.registration.max_points);
-  if (!register_scan(points, map_, config_, tried).accepted) {
+  if (!register_scan(points, map_, config_, 0, tried).accepted) {
     forget_map();
     return false;
   }
@@ -169,8 +170,9 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   // A clipped gyro bends the scan. What the scan then says of the missing rate unbends it.
   constexpr int kPasses = 4;
   constexpr double kSettled = 0.02;  // rad/s
-  filter_.set_noise(
-      shaken_by(config_.imu, white_noise(imu_.between(scan.end - kShakenFor, scan.end))));
+  const WhiteNoise shaking = white_noise(imu_.between(scan.end - kShakenFor, scan.end));
+  filter_.set_noise(shaken_by(config_.imu, shaking));
+  shaken_rad_ = stood_at_ ? 0 : shaken_angle(shaking);
   const ErrorStateFilter before = filter_;
   const GyroCompletion gyro_before = gyro_;
   for (int pass = 1;; ++pass) {
@@ -187,7 +189,7 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
       update.recovered = recover(downsampled, update.registration);
     } else {
       const NavigationState predicted = filter_.state();
-      update.registration = register_scan(downsampled, map_, config_, filter_);
+      update.registration = register_scan(downsampled, map_, config_, shaken_rad_, filter_);
       missing = missing_rates(clipped, local(predicted, filter_.state()).segment<3>(kRotation));
     }
     const double change = (missing - gyro_.missing_radps).norm();

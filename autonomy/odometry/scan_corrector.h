@@ -81,6 +81,7 @@ class ScanCorrector {
   MapDrift drift_;
   MapDrift::Met map_met_;  ///< as of the last scan
   double accel_scale_ = 1;
+  double shaken_rad_ = 0;  ///< 1 sigma of the IMU against the vehicle, now
   GyroCompletion gyro_;
   ImuBuffer imu_;
   std::vector<LidarScanPtr> standing_scans_;  ///< taken at standstill before the start

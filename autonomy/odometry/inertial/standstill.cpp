@@ -18,6 +18,13 @@ std::span<const ImuSample> newest(std::span<const ImuSample> samples, double win
   return {first, samples.end()};
 }
 
+/// What is shaken stays where it is: its spectrum ends at some 3 Hz, and its integral is bounded.
+/// Of density D above f, the integral scatters by D / (2 pi sqrt(f)).
+double scatter_of_integral(double density) {
+  constexpr double kEnd_hz = 3;
+  return density / (2 * std::numbers::pi * std::sqrt(kEnd_hz));
+}
+
 }  // namespace
 
 ImuMoments moments(std::span<const ImuSample> samples) {
@@ -79,16 +86,15 @@ ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured
 }
 
 ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured) {
-  // What is shaken stays where it is: its spectrum ends at some 3 Hz, and its integral is bounded.
-  // Of density D above f, the integral scatters by D / (2 pi sqrt(f)). Two of these, at the begin
-  // and the end of a scan of 0.1 s, are what white noise of 0.4 D makes of it.
-  constexpr double kEnd_hz = 3, kScan_s = 0.1;
-  const double share =
-      std::sqrt(2.0) / (2 * std::numbers::pi * std::sqrt(kEnd_hz)) / std::sqrt(kScan_s);
-  imu.gyro_noise_density = std::max(imu.gyro_noise_density, share * measured.gyro);
+  // Two of the integral's scatters, at the begin and the end of a scan of 0.1 s, are what white
+  // noise of 0.4 of the density makes of it.
+  constexpr double kScan_s = 0.1;
+  const double share = std::sqrt(2.0) * scatter_of_integral(1) / std::sqrt(kScan_s);
   imu.accel_noise_density = std::max(imu.accel_noise_density, share * measured.accel);
   return imu;
 }
+
+double shaken_angle(const WhiteNoise& measured) { return scatter_of_integral(measured.gyro); }
 
 OdometryNeed missing_for_start(std::span<const ImuSample> samples,
                                const StaticInitialiserConfig& config) {

@@ -64,7 +64,13 @@ struct Standstill {
 /// of a worse grade, and its bias, which standing for a second cannot tell, walks in proportion.
 [[nodiscard]] ImuNoiseConfig scaled_to_measured(ImuNoiseConfig imu, const WhiteNoise& measured);
 
-/// The same for an IMU that is shaken so now: its bias is none the worse for it.
+/// The same for an accelerometer that is shaken so now: its bias is none the worse for it.
 [[nodiscard]] ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured);
+
+/// 1 sigma, each axis, of the angle by which an IMU is shaken so against the vehicle, rad. It does
+/// not add up: the gyro's integral follows the shaking, and the vehicle stays where it is. So it is
+/// noise of whatever compares the two, and not of the motion; taken for the latter, every scan
+/// would turn the attitude as it likes, which is how a map gets tilted at lift-off.
+[[nodiscard]] double shaken_angle(const WhiteNoise& measured);
 
 }  // namespace arex

@@ -128,7 +128,7 @@ TEST(RegisterScan, FindsThePoseInACorner) {
     x.p_OB = 0.06 * random.normal3();
     ErrorStateFilter filter(config.imu);
     filter.reset(x, pose_doubt());
-    const RegistrationReport report = register_scan(corner.points, corner.map, config, filter);
+    const RegistrationReport report = register_scan(corner.points, corner.map, config, 0, filter);
     EXPECT_TRUE(report.accepted);
     EXPECT_LT(filter.state().p_OB.norm(), 0.003);
     EXPECT_LT(so3::angle(filter.state().R_OB), 0.001);
@@ -141,7 +141,7 @@ TEST(RegisterScan, NamesTheDirectionsThatOneWallLeavesOpen) {
   const LidarInertialConfig config;
   ErrorStateFilter filter(config.imu);
   filter.reset(NavigationState{}, pose_doubt());
-  const RegistrationReport report = register_scan(wall.points, wall.map, config, filter);
+  const RegistrationReport report = register_scan(wall.points, wall.map, config, 0, filter);
   EXPECT_GT(report.position_std_m[1], 50 * report.position_std_m[2]);  // two of three are open
   EXPECT_LT(std::abs(report.worst_position_axis_O.z()), 0.05);
   EXPECT_GT(std::abs(report.worst_rotation_axis_B.z()), 0.95);
@@ -163,7 +163,7 @@ TEST(RegisterScan, OutliersHardlyMoveIt) {
   }
   ErrorStateFilter filter(config.imu);
   filter.reset(NavigationState{}, pose_doubt());
-  const RegistrationReport report = register_scan(points, corner.map, config, filter);
+  const RegistrationReport report = register_scan(points, corner.map, config, 0, filter);
   EXPECT_TRUE(report.accepted);
   EXPECT_LT(filter.state().p_OB.norm(), 0.02);
 }
@@ -176,11 +176,11 @@ TEST(RegisterScan, RefusesWhatDoesNotFit) {
   x.p_OB = Vec3(30, 30, 30);
   filter.reset(x, pose_doubt());
   const ErrorMatrix before = filter.covariance();
-  const RegistrationReport report = register_scan(corner.points, corner.map, config, filter);
+  const RegistrationReport report = register_scan(corner.points, corner.map, config, 0, filter);
   EXPECT_FALSE(report.accepted);
   EXPECT_EQ(filter.state().p_OB, x.p_OB);
   EXPECT_EQ(filter.covariance(), before);
-  EXPECT_FALSE(register_scan({}, corner.map, config, filter).accepted);
+  EXPECT_FALSE(register_scan({}, corner.map, config, 0, filter).accepted);
 }
 
 }  // namespace

@@ -68,15 +68,18 @@ void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
   Eigen::Matrix<double, kNoiseDim, 1> Q;
   const Vec3 rate = x_.rate(imu.mean_gyro());
   const double held = imu.held ? 1 : 0;
+  const double delay_std_s = standing ? 0 : std::sqrt(P_(kTimeOffset, kTimeOffset));
   for (int i = 0; i < 3; ++i) {
-    const double gyro =
+    const double gyro_noise =
         imu.gyro_clipped[static_cast<std::size_t>(i)]
             ? noise_.clipped_gyro_noise_density
             : std::hypot(noise_.gyro_noise_density, noise_.gyro_scale_noise_density * rate.norm(),
                          held * held_noise(kHeldRateDrift, dt));
+    const double gyro = std::hypot(gyro_noise, delay_std_s * imu.gyro_slope_noise[i]);
     Q[i] = gyro * gyro / dt;
     const double accel =
-        std::hypot(noise_.accel_noise_density, held * held_noise(kHeldForceDrift, dt));
+        std::hypot(noise_.accel_noise_density, held * held_noise(kHeldForceDrift, dt),
+                   delay_std_s * imu.accel_slope_noise[i]);
     Q[3 + i] = accel * accel / dt;
     Q[6 + i] = noise_.gyro_walk_density * noise_.gyro_walk_density / dt;
     Q[9 + i] = noise_.accel_walk_density * noise_.accel_walk_density / dt;

@@ -161,7 +161,8 @@ TEST(MeshBuilder, ChunksCoverEveryTriangleOnceWithinTheirBounds) {
 
 TEST(MeshBuilder, RejectsImpossiblePrimitives) {
   MeshBuilder builder;
-  EXPECT_THROW(builder.add_object(SurfaceClass::kWall, 1.5), std::invalid_argument);
+  EXPECT_THROW(builder.add_object(SurfaceClass::kWall, -0.1), std::invalid_argument);
+  EXPECT_THROW(builder.add_object(SurfaceClass::kWall, 1001), std::invalid_argument);
   const std::uint32_t object = builder.add_object(SurfaceClass::kWall, 0.5);
   const std::vector<Vec3> one_point{Vec3::Zero()};
   const std::vector<double> one_radius{1.0};

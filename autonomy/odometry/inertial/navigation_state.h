@@ -69,12 +69,15 @@ ErrorMatrix local_jacobian_inverse(const NavigationState& x, const NavigationSta
 struct ImuInterval {
   Stamp begin = 0;
   Stamp end = 0;
-  Vec3 gyro_begin, gyro_end;           ///< rad/s
-  Vec3 accel_begin, accel_end;         ///< m/s^2
-  Vec3 gyro_slope = Vec3::Zero();      ///< of the readings over all intervals at once, rad/s^2
-  Vec3 accel_slope = Vec3::Zero();     ///< m/s^3
-  std::array<bool, 3> gyro_clipped{};  ///< axes of the gyro at their full scale
-  bool held = false;                   ///< for want of newer readings, for longer than jitter
+  Vec3 gyro_begin, gyro_end;        ///< rad/s
+  Vec3 accel_begin, accel_end;      ///< m/s^2
+  Vec3 gyro_slope = Vec3::Zero();   ///< of the readings over all intervals at once, rad/s^2
+  Vec3 accel_slope = Vec3::Zero();  ///< m/s^3
+  /// White noise that has the effect of what is unknown of the slopes, per second of delay.
+  Vec3 gyro_slope_noise = Vec3::Zero();   ///< rad/s^2/sqrt(Hz)
+  Vec3 accel_slope_noise = Vec3::Zero();  ///< m/s^3/sqrt(Hz)
+  std::array<bool, 3> gyro_clipped{};     ///< axes of the gyro at their full scale
+  bool held = false;                      ///< for want of newer readings, for longer than jitter
 
   [[nodiscard]] double dt_s() const { return to_seconds(end - begin); }
   [[nodiscard]] Vec3 mean_gyro() const { return 0.5 * (gyro_begin + gyro_end); }

@@ -201,6 +201,29 @@ TEST(ErrorStateFilter, NeesLiesInItsBandOnAKnownMap) {
   EXPECT_NEAR(sum / kRuns, kStates, band);
 }
 
+// A vehicle that speeds up its turn by 10 rad/s^2 after the last reading is a t^2 / 2 off, and one
+// that changes its acceleration by 30 m/s^3 a t^3 / 6, of which the filter, which asks for the
+// velocity's error over the whole interval, makes somewhat more.
+TEST(ErrorStateFilter, AHeldReadingAges) {
+  for (const double held_s : {0.005, 0.02, 0.1}) {
+    ImuInterval imu;
+    imu.end = from_seconds(held_s);
+    imu.held = true;
+    imu.gyro_begin = imu.gyro_end = Vec3::Zero();
+    imu.accel_begin = imu.accel_end = Vec3(0, 0, kGravity);
+    ImuNoiseConfig noise;
+    noise.gyro_noise_density = noise.accel_noise_density = 1e-9;
+    ErrorStateFilter filter(noise);
+    filter.reset(NavigationState{}, ErrorMatrix::Zero());
+    filter.predict(imu);
+    const auto std_of = [&](int index) { return std::sqrt(filter.covariance()(index, index)); };
+    EXPECT_NEAR(std_of(kRotation), 5 * held_s * held_s, 0.01 * 5 * held_s * held_s);
+    EXPECT_NEAR(std_of(kVelocity + 2), 15 * held_s * held_s, 0.01 * 15 * held_s * held_s);
+    EXPECT_GE(std_of(kPosition + 2), 5 * held_s * held_s * held_s);
+    EXPECT_LT(std_of(kPosition + 2), 10 * held_s * held_s * held_s);
+  }
+}
+
 TEST(ErrorStateFilter, AClippedGyroAxisIsDoubted) {
   ImuNoiseConfig noise;
   ErrorStateFilter filter(noise);

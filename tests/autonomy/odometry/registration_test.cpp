@@ -168,6 +168,25 @@ TEST(RegisterScan, OutliersHardlyMoveIt) {
   EXPECT_LT(filter.state().p_OB.norm(), 0.02);
 }
 
+// A prior that knows nothing leaves the scan's own covariance, and the shaking beside it.
+TEST(RegisterScan, WhatShakesTheImuIsNotKnownBetterForManyPoints) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  const auto registered = [&](double shaken_rad) {
+    ErrorStateFilter filter(config.imu);
+    ErrorMatrix P = pose_doubt();
+    P.diagonal().head<6>().setConstant(1);
+    filter.reset(NavigationState{}, P);
+    EXPECT_TRUE(register_scan(corner.points, corner.map, config, shaken_rad, filter).accepted);
+    return Mat3(filter.covariance().topLeftCorner<3, 3>());
+  };
+  const Mat3 still = registered(0);
+  for (const double shaken_rad : {2e-4, 1e-3, 5e-3}) {
+    const Mat3 expected = still + shaken_rad * shaken_rad * Mat3::Identity();
+    EXPECT_LT((registered(shaken_rad) - expected).norm(), 0.01 * expected.norm()) << shaken_rad;
+  }
+}
+
 TEST(RegisterScan, RefusesWhatDoesNotFit) {
   const Corner corner(true);
   const LidarInertialConfig config;

@@ -80,7 +80,9 @@ TEST(Modules, FurtherSourcesRunBesideAndAreScored) {
   EXPECT_EQ(poses_of("twin.tum"), poses_of("estimate.tum"));
   EXPECT_EQ(others["twin"]["ate_rmse_m"], summary["odometry"]["ate_rmse_m"]);
   EXPECT_LT(others["oracle"]["ate_rmse_m"].get<double>(), 1e-6);
-  EXPECT_GT(others["reckoning"]["ate_rmse_m"].get<double>(), 0.2);
+  // Nothing corrects it.
+  EXPECT_GT(others["reckoning"]["ate_rmse_m"].get<double>(),
+            3 * summary["odometry"]["ate_rmse_m"].get<double>());
   EXPECT_GT(others["reckoning"]["end_error_m"].get<double>(),
             others["reckoning"]["ate_rmse_m"].get<double>());
 }

@@ -66,7 +66,8 @@ void ErrorStateFilter::predict(const ImuInterval& imu, bool standing) {
   PropagationJacobians jacobians = propagation_jacobians(x_, imu);
   if (standing) jacobians.F.col(kTimeOffset).head<kTimeOffset>().setZero();
   Eigen::Matrix<double, kNoiseDim, 1> Q;
-  const Vec3 rate = x_.rate(imu.mean_gyro());
+  // Of the turn, without what shakes the gyro to and fro.
+  const Vec3 rate = x_.rate(imu.gyro_level);
   const double held = imu.held ? 1 : 0;
   const double delay_std_s = standing ? 0 : std::sqrt(P_(kTimeOffset, kTimeOffset));
   for (int i = 0; i < 3; ++i) {

@@ -77,6 +77,7 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
 
 /// A straight line through readings, by least squares.
 struct Slope {
+  Vec3 mean = Vec3::Zero();
   Vec3 value = Vec3::Zero();  ///< per s, drawn to zero as far as it may be noise
   Vec3 std = Vec3::Zero();    ///< 1 sigma, by what scatters about the line
 };
@@ -101,7 +102,7 @@ Slope fit_slope(const std::vector<ImuInterval>& intervals, const std::vector<dou
   const double freedom = static_cast<double>(intervals.size()) - 2;
   const Vec3 variance = scatter / (freedom * spread);
   const double sure = 1 - variance.sum() / std::max(slope.squaredNorm(), 1e-12);
-  return {std::max(0.0, sure) * slope, variance.cwiseSqrt()};
+  return {mean, std::max(0.0, sure) * slope, variance.cwiseSqrt()};
 }
 
 /// How the readings change over the intervals. The weights of a slope are odd about the middle,
@@ -113,6 +114,7 @@ void add_slopes(std::vector<ImuInterval>& intervals) {
   std::vector<ImuInterval> read;
   std::copy_if(intervals.begin(), intervals.end(), std::back_inserter(read),
                [](const ImuInterval& imu) { return !imu.held; });
+  for (ImuInterval& imu : intervals) imu.gyro_level = imu.mean_gyro();
   if (read.size() < 4) return;
   std::vector<double> middles_s;
   double total_s = 0, mean_s = 0;
@@ -127,6 +129,7 @@ void add_slopes(std::vector<ImuInterval>& intervals) {
   const Slope accel =
       fit_slope(read, middles_s, total_s, [](const ImuInterval& i) { return i.mean_accel(); });
   for (ImuInterval& imu : intervals) {
+    imu.gyro_level = gyro.mean;
     imu.gyro_slope = gyro.value;
     imu.accel_slope = accel.value;
     imu.gyro_slope_noise = std::sqrt(total_s) * gyro.std;

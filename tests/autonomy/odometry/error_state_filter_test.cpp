@@ -231,7 +231,7 @@ TEST(ErrorStateFilter, AClippedGyroAxisIsDoubted) {
   ImuInterval imu;
   imu.end = 5'000'000;
   imu.accel_begin = imu.accel_end = Vec3(0, 0, kGravity);
-  imu.gyro_begin = imu.gyro_end = Vec3(0, 0, 4);
+  imu.gyro_begin = imu.gyro_end = imu.gyro_level = Vec3(0, 0, 4);
   imu.gyro_clipped = {false, false, true};
   filter.predict(imu);
   EXPECT_NEAR(std::sqrt(filter.covariance()(2, 2)),

@@ -52,9 +52,10 @@ nlohmann::json fly(const std::vector<std::string>& variables, const std::string&
 /// What a summary says about the flight, not about the host: all but the times.
 nlohmann::json flown(nlohmann::json summary) {
   for (const char* key : {"wall_time_s", "cpu_time_s", "real_time_factor"}) summary.erase(key);
-  if (summary["planner"].is_object()) {
-    summary["planner"].erase("median_ms");
-    summary["planner"].erase("p99_ms");
+  for (const char* part : {"planner", "exploration"}) {
+    if (!summary[part].is_object()) continue;
+    summary[part].erase("median_ms");
+    summary[part].erase("p99_ms");
   }
   return summary;
 }

@@ -142,7 +142,8 @@ TEST(LidarInertialOdometry, FindsTheGyrosScaleAndTheImusClock) {
     const NavigationState& state = run.updates.back().state;
     // Further off, the way is bent until the offset is found.
     const bool far = std::abs(clock_offset) > 20'000'000;
-    EXPECT_LT(worst_error(r, run), far ? 0.1 : 0.06) << gyro_scale.transpose() << ", " << clock_offset;
+    EXPECT_LT(worst_error(r, run), far ? 0.1 : 0.06)
+        << gyro_scale.transpose() << ", " << clock_offset;
     EXPECT_NEAR(state.t_d, 1e-9 * static_cast<double>(clock_offset), 1e-3);
     // About the axis that the flight turns about; it hardly rolls and pitches.
     EXPECT_NEAR((1 + state.s_g.z()) * gyro_scale.z(), 1, 0.005);

@@ -55,8 +55,8 @@ TEST(OdometryFlight, GoesDownTheRampAndAlongTheGarage) {
   expect_arrival(flown.result);
   EXPECT_GT(flown.result.flight.distance_m, 150);
   const OdometryScore& score = flown.result.flight.odometry;
-  // Aligned at the start: what a scan from the ground leaves of the map's tilt, below a milliradian,
-  // 90 m away. The shape of the flight knows nothing of it.
+  // Aligned at the start: what a scan from the ground leaves of the map's tilt, below a
+  // milliradian, 90 m away. The shape of the flight knows nothing of it.
   EXPECT_LT(score.ate_rmse_m, 0.08);
   EXPECT_LT(score.ate_se3_rmse_m, 0.012);
   EXPECT_LT(score.yaw_error_max_deg, 0.4);

@@ -70,7 +70,7 @@ struct RegistrationConfig {
   double converged_m = 1e-3;
   double gate_sigma = 4.0;
   double robust_sigma = 2.0;
-  double variance_inflation = 9.0;
+  double variance_inflation = 4.0;
 
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
@@ -102,7 +102,7 @@ struct OdometryHealthConfig {
   double degenerate_silence_s = 0.35;
   double lost_silence_s = 3.0;
   int lost_scans = 5;
-  double noticed_innovation = 1.2;
+  double noticed_innovation = 1.5;
   double doubtful_innovation = 4.0;
   int recovery_points = 300;
   int recovery_yaw_steps = 36;
@@ -128,7 +128,7 @@ struct OdometryHealthConfig {
     f("lost_scans", lost_scans, "refused scans in a row: lost");
     f("noticed_innovation", noticed_innovation,
       "a scan that corrects the prediction by this many sigma, RMS over the pose, is degenerate: "
-      "the IMU errs (sound: below 0.4; 5 % of gyro scale in a spin: 2.1)");
+      "the IMU errs (sound: below 1; 5 % of gyro scale in a spin: 3)");
     f("doubtful_innovation", doubtful_innovation,
       "a scan that corrects the prediction by this many sigma contradicts the IMU: degenerate, and "
       "kept out of the map; lost_scans of them in a row: lost");

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "math/so3.h"
+#include "odometry/inertial/imu_slopes.h"
 #include "odometry/relocalisation.h"
 
 namespace arex {
@@ -11,6 +12,9 @@ namespace {
 
 /// Over so long the shaking of the IMU is measured.
 constexpr Stamp kShakenFor = kNanosecondsPerSecond;
+/// A surfel's own error is the same for scan after scan and does not average out with their noise.
+/// So much more than that noise it leaves in the map, by the NEES of flights.
+constexpr double kSharedError = 9;
 
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
   std::vector<float> fractions;
@@ -56,8 +60,8 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   gyro_.full_scale_radps = job.gyro_full_scale_radps;
   ScanUpdate update;
   update.begin = job.scan->stamp;
-  update.stamp = job.scan->end;
-  if (stood_at_ && has_imu_gap(imu_.between(stamp_, update.stamp), update.stamp)) start_again();
+  update.end = job.scan->end;
+  if (stood_at_ && has_imu_gap(imu_.between(stamp_, update.end), update.end)) start_again();
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
@@ -75,7 +79,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
       if (confirmations_left_ == 0) {
         insert(points, points_O);
         drift_.add(map_met_,
-                   turned(update.registration.covariance, filter_.state().R_OB) +
+                   kSharedError * turned(update.registration.covariance, filter_.state().R_OB) +
                        distortion(filter_.noise(), to_seconds(job.scan->end - job.scan->stamp)),
                    filter_.state().p_OB);
       }
@@ -84,6 +88,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
     update.fractions = std::make_shared<const std::vector<float>>(std::move(fractions));
     if (status_ == OdometryStatus::kLost && stood_at_) start_again();
   }
+  update.stamp = stamp_;
   update.correction_stamp = correction_stamp_;
   update.status = status_;
   update.need = need_;
@@ -132,7 +137,7 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
     still.begin = scan->stamp;
     still.end = scan->end;
     still.X_OB = filter_.state().X_OB();
-    points = undistort(*scan, {still}, X_BL_, config_.lidar, body_radius_m_);
+    points = undistort(*scan, {still}, still.X_OB, X_BL_, config_.lidar, body_radius_m_);
     insert(points, to_O(points));
     drift_.add_first();
   }
@@ -170,17 +175,20 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   // A clipped gyro bends the scan. What the scan then says of the missing rate unbends it.
   constexpr int kPasses = 4;
   constexpr double kSettled = 0.02;  // rad/s
+  const Stamp length = scan.end - scan.stamp, middle = scan.stamp + length / 2;
   const WhiteNoise shaking = white_noise(imu_.between(scan.end - kShakenFor, scan.end));
   filter_.set_noise(shaken_by(config_.imu, shaking));
   shaken_rad_ = stood_at_ ? 0 : shaken_angle(shaking);
+  const double mean_shaken_rad = stood_at_ ? 0 : shaken_angle(shaking, to_seconds(length));
   const ErrorStateFilter before = filter_;
   const GyroCompletion gyro_before = gyro_;
   for (int pass = 1;; ++pass) {
     ClippedTime clipped;
-    const std::vector<MotionSegment> segments = predict_to(scan.end, clipped);
+    std::vector<MotionSegment> segments = predict_to(middle, length, shaking, clipped);
     if (stood_at_) hold_standstill(scan.end);
-    std::vector<ScanPoint> points =
-        undistort(scan, segments, filter_.state().X_BL, config_.lidar, body_radius_m_);
+    for (const MotionSegment& after : motion(middle, scan.end)) segments.push_back(after);
+    std::vector<ScanPoint> points = undistort(scan, segments, filter_.state().X_OB(),
+                                              filter_.state().X_BL, config_.lidar, body_radius_m_);
     const std::vector<ScanPoint> downsampled = voxel_downsample(
         points, config_.registration.scan_voxel_m, config_.registration.max_points);
     update.gyro_clipped = clipped.any();
@@ -189,13 +197,13 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
       update.recovered = recover(downsampled, update.registration);
     } else {
       const NavigationState predicted = filter_.state();
-      update.registration = register_scan(downsampled, map_, config_, shaken_rad_, filter_);
+      update.registration = register_scan(downsampled, map_, config_, mean_shaken_rad, filter_);
       missing = missing_rates(clipped, local(predicted, filter_.state()).segment<3>(kRotation));
     }
     const double change = (missing - gyro_.missing_radps).norm();
     if (!clipped.any() || change < kSettled || pass == kPasses) {
       gyro_.missing_radps = missing;
-      stamp_ = scan.end;
+      stamp_ = middle;
       imu_.forget_before(stamp_ - kShakenFor);
       return points;
     }
@@ -205,15 +213,33 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   }
 }
 
-std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, ClippedTime& clipped) {
+std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, Stamp scan_length,
+                                                     const WhiteNoise& shaking,
+                                                     ClippedTime& clipped) {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  for (ImuInterval& imu :
-       imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_, filter_.state().t_d)) {
+  const double t_d = filter_.state().t_d;
+  std::vector<ImuInterval> intervals =
+      imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_, t_d);
+  add_slopes(intervals, imu_.samples(), accel_scale_, t_d, scan_length, shaking);
+  for (ImuInterval& imu : intervals) {
     gyro_.complete(imu);
     clipped.add(imu, gyro_.full_scale_radps);
     segments.push_back(motion_segment(filter_.state(), imu));
     filter_.predict(imu, stood_at_.has_value());
+  }
+  return segments;
+}
+
+std::vector<MotionSegment> ScanCorrector::motion(Stamp from, Stamp to) const {
+  std::vector<MotionSegment> segments;
+  if (imu_.empty()) return segments;
+  NavigationState x = filter_.state();
+  GyroCompletion gyro = gyro_;
+  for (ImuInterval& imu : imu_intervals(imu_.samples(), from, to, accel_scale_, x.t_d)) {
+    gyro.complete(imu);
+    segments.push_back(motion_segment(x, imu));
+    x = propagate(x, imu);
   }
   return segments;
 }

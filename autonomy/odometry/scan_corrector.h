@@ -23,9 +23,10 @@ struct ScanJob {
 using PointsPtr = std::shared_ptr<const std::vector<Vec3f>>;
 using FractionsPtr = std::shared_ptr<const std::vector<float>>;
 
-/// What came of one scan. Holds at `stamp`, the scan's end.
+/// What came of one scan. Its state holds at `stamp`, the scan's middle: that is when the pose was
+/// which the scan's points see in the mean, whatever the motion between them is taken for.
 struct ScanUpdate {
-  Stamp begin = 0;  ///< of the scan
+  Stamp begin = 0, end = 0;  ///< of the scan
   Stamp stamp = 0;
   Stamp correction_stamp = 0;  ///< of the newest scan that corrected the state
   OdometryStatus status = OdometryStatus::kInitialising;
@@ -66,7 +67,11 @@ class ScanCorrector {
   /// Before take-off the vehicle is where it started: holds the filter there, by a
   /// pseudo-measurement, while it stands.
   void hold_standstill(Stamp until);
-  std::vector<MotionSegment> predict_to(Stamp stamp, ClippedTime& clipped);
+  /// @param scan_length of the scan that is predicted to
+  std::vector<MotionSegment> predict_to(Stamp stamp, Stamp scan_length, const WhiteNoise& shaking,
+                                        ClippedTime& clipped);
+  /// The motion that follows from the filter's state, which is that at `from`.
+  [[nodiscard]] std::vector<MotionSegment> motion(Stamp from, Stamp to) const;
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);

@@ -7,25 +7,25 @@
 namespace arex {
 namespace {
 
-/// A segment made ready for its points: p_Lend = M (q + t x (q + t/2 x (q + t/3 x q))) + c(tau),
-/// with q the point in B at its own time, t = w tau the small turn since the segment's middle
-/// (fourth order is left out: below 1e-6 rad at 10 rad/s) and c the vehicle's path.
+/// A segment made ready for its points: in L at the instant, p = M (q + t x (q + t/2 x (q + t/3 x
+/// q))) + c(tau), with q the point in B at its own time, t = w tau the small turn since the
+/// segment's middle (fourth order is left out: below 1e-6 rad at 10 rad/s) and c the vehicle's
+/// path.
 struct PointTransform {
   Mat3 M;
   Vec3 w;
   Vec3 c0, c1, c2;
 };
 
-PointTransform make_transform(const MotionSegment& segment, const Pose& X_LO_end,
-                              double half_dt_s) {
+PointTransform make_transform(const MotionSegment& segment, const Pose& X_LO, double half_dt_s) {
   const Pose middle = segment.pose_at(half_dt_s);
   const Vec3 v_middle = segment.v_OB + half_dt_s * segment.a_OB;
   PointTransform t;
-  t.M = X_LO_end.R * middle.R;
+  t.M = X_LO.R * middle.R;
   t.w = segment.w_OB_B;
-  t.c0 = X_LO_end * middle.p;
-  t.c1 = X_LO_end.R * v_middle;
-  t.c2 = 0.5 * (X_LO_end.R * segment.a_OB);
+  t.c0 = X_LO * middle.p;
+  t.c1 = X_LO.R * v_middle;
+  t.c2 = 0.5 * (X_LO.R * segment.a_OB);
   return t;
 }
 
@@ -49,19 +49,18 @@ MotionSegment motion_segment(const NavigationState& x, const ImuInterval& imu) {
 }
 
 std::vector<ScanPoint> undistort(const LidarScan& scan, const std::vector<MotionSegment>& segments,
-                                 const Pose& X_BL, const LidarNoiseConfig& config,
+                                 const Pose& X_OB, const Pose& X_BL, const LidarNoiseConfig& config,
                                  double body_radius_m) {
   std::vector<ScanPoint> out;
   if (segments.empty()) return out;
   out.reserve(scan.points.size());
 
-  const MotionSegment& last = segments.back();
-  const Pose X_LO_end = (last.pose_at(to_seconds(last.end - last.begin)) * X_BL).inverse();
+  const Pose X_LO = (X_OB * X_BL).inverse();
   std::vector<PointTransform> transforms;
   transforms.reserve(segments.size());
   for (const MotionSegment& segment : segments) {
     transforms.push_back(
-        make_transform(segment, X_LO_end, 0.5 * to_seconds(segment.end - segment.begin)));
+        make_transform(segment, X_LO, 0.5 * to_seconds(segment.end - segment.begin)));
   }
 
   const double body_radius2 = body_radius_m * body_radius_m;

@@ -74,7 +74,7 @@ Vec3 missing_rates(const ClippedTime& clipped, const Vec3& turn_rad) {
   Vec3 missing = Vec3::Constant(GyroCompletion::kUntold);
   for (int i = 0; i < 3; ++i) {
     if (clipped.seconds[i] < kShortest) continue;
-    const double lacking_rad = 2 * clipped.side[i] * turn_rad[i];
+    const double lacking_rad = clipped.side[i] * turn_rad[i];
     missing[i] =
         std::clamp((clipped.added_rad[i] + lacking_rad) / clipped.seconds[i], 0.0, kMostMissing);
   }

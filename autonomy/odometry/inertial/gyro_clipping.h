@@ -55,9 +55,9 @@ struct ClippedTime {
   [[nodiscard]] bool any() const { return seconds.maxCoeff() > 0; }
 };
 
-/// What the registration's turn of the attitude says of the missing rates. A scan undistorted with
-/// a rate that lacks d shows half of the turn that is missing at its end: its points lack nothing
-/// at its begin.
+/// What the registration's turn of the attitude says of the missing rates. A scan that is
+/// undistorted to its middle with a rate that lacks d shows the turn that is missing there: what
+/// the points before it lack those behind it have too much.
 /// @param turn_rad correction of the attitude by the scan, in B
 /// @return the missing rates, axis by axis; kUntold where nothing was clipped for long enough.
 Vec3 missing_rates(const ClippedTime& clipped, const Vec3& turn_rad);

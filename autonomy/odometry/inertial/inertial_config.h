@@ -7,7 +7,7 @@ namespace arex {
 /// What an odometry believes of its IMU.
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
-  double delay_std_s = 0.03;                ///< 1 sigma of that before take-off
+  double delay_std_s = 0.01;                ///< 1 sigma of that before take-off
   double delay_walk_density = 2e-4;         ///< s/sqrt(s)
   double gyro_scale_std = 0.02;             ///< 1 sigma of the scale's error before take-off
   double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
@@ -23,7 +23,9 @@ struct ImuNoiseConfig {
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added. Estimated from there on");
     f("delay_std_s", delay_std_s,
-      "1 sigma of the delay before take-off: clocks that nobody synchronised; 0 takes it as known");
+      "1 sigma of the delay before take-off: clocks that nobody synchronised; one that is 50 ms "
+      "off is "
+      "found as well. 0 takes it as known");
     f("delay_walk_density", delay_walk_density,
       "s/sqrt(s), walk of the delay: what was learned of it while it was far off is forgotten in "
       "some ten seconds");

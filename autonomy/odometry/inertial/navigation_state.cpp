@@ -75,68 +75,6 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
   accel = accel_scale * (a.accel_mps2 + s * (b.accel_mps2 - a.accel_mps2));
 }
 
-/// A straight line through readings, by least squares.
-struct Slope {
-  Vec3 mean = Vec3::Zero();
-  Vec3 value = Vec3::Zero();  ///< per s, drawn to zero as far as it may be noise
-  Vec3 std = Vec3::Zero();    ///< 1 sigma, by what scatters about the line
-};
-
-/// @param middles_s of the intervals, about their weighted mean
-template <typename Reading>
-Slope fit_slope(const std::vector<ImuInterval>& intervals, const std::vector<double>& middles_s,
-                double total_s, Reading reading) {
-  Vec3 mean = Vec3::Zero(), slope = Vec3::Zero(), scatter = Vec3::Zero();
-  double spread = 0;
-  for (std::size_t i = 0; i < intervals.size(); ++i) {
-    const double lever = intervals[i].dt_s() * middles_s[i];
-    mean += intervals[i].dt_s() / total_s * reading(intervals[i]);
-    slope += lever * reading(intervals[i]);
-    spread += lever * middles_s[i];
-  }
-  slope /= spread;
-  for (std::size_t i = 0; i < intervals.size(); ++i) {
-    const Vec3 off = reading(intervals[i]) - mean - middles_s[i] * slope;
-    scatter += intervals[i].dt_s() * off.cwiseAbs2();
-  }
-  const double freedom = static_cast<double>(intervals.size()) - 2;
-  const Vec3 variance = scatter / (freedom * spread);
-  const double sure = 1 - variance.sum() / std::max(slope.squaredNorm(), 1e-12);
-  return {mean, std::max(0.0, sure) * slope, variance.cwiseSqrt()};
-}
-
-/// How the readings change over the intervals. The weights of a slope are odd about the middle,
-/// those of the integral even: so the noise of the slope is none of the turn that is integrated,
-/// and an estimate of the delay that compares both is not drawn to what is noise. A slope that is
-/// noise itself would let an estimate believe that it had seen no delay: it is left out in
-/// proportion, and what is unknown of it told.
-void add_slopes(std::vector<ImuInterval>& intervals) {
-  std::vector<ImuInterval> read;
-  std::copy_if(intervals.begin(), intervals.end(), std::back_inserter(read),
-               [](const ImuInterval& imu) { return !imu.held; });
-  for (ImuInterval& imu : intervals) imu.gyro_level = imu.mean_gyro();
-  if (read.size() < 4) return;
-  std::vector<double> middles_s;
-  double total_s = 0, mean_s = 0;
-  for (const ImuInterval& imu : read) {
-    middles_s.push_back(to_seconds(imu.begin - read.front().begin) + 0.5 * imu.dt_s());
-    total_s += imu.dt_s();
-    mean_s += imu.dt_s() * middles_s.back();
-  }
-  for (double& middle_s : middles_s) middle_s -= mean_s / total_s;
-  const Slope gyro =
-      fit_slope(read, middles_s, total_s, [](const ImuInterval& i) { return i.mean_gyro(); });
-  const Slope accel =
-      fit_slope(read, middles_s, total_s, [](const ImuInterval& i) { return i.mean_accel(); });
-  for (ImuInterval& imu : intervals) {
-    imu.gyro_level = gyro.mean;
-    imu.gyro_slope = gyro.value;
-    imu.accel_slope = accel.value;
-    imu.gyro_slope_noise = std::sqrt(total_s) * gyro.std;
-    imu.accel_slope_noise = std::sqrt(total_s) * accel.std;
-  }
-}
-
 }  // namespace
 
 std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp from, Stamp to,
@@ -162,7 +100,6 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
     interval.accel_begin = interval.accel_end;
     if (next != samples.end()) ++next;
   }
-  add_slopes(intervals);
   for (ImuInterval& covered : intervals) {
     covered.begin -= delay;
     covered.end -= delay;

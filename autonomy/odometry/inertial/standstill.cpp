@@ -10,6 +10,9 @@
 namespace arex {
 namespace {
 
+/// Below that frequency nothing shakes an IMU: there it would move the vehicle.
+constexpr double kShakingEnds_hz = 3;
+
 /// The samples of the last `window_s` before the newest.
 std::span<const ImuSample> newest(std::span<const ImuSample> samples, double window_s) {
   const Stamp begin = samples.back().stamp - from_seconds(window_s);
@@ -18,14 +21,11 @@ std::span<const ImuSample> newest(std::span<const ImuSample> samples, double win
   return {first, samples.end()};
 }
 
-/// What is shaken stays where it is: its spectrum ends at some 3 Hz, and its integral is bounded.
-/// Of density D above f, the integral scatters by D / (2 pi sqrt(f)).
-double scatter_of_integral(double density) {
-  constexpr double kEnd_hz = 3;
-  return density / (2 * std::numbers::pi * std::sqrt(kEnd_hz));
-}
-
 }  // namespace
+
+double scatter_of_integral(double density) {
+  return density / (2 * std::numbers::pi * std::sqrt(kShakingEnds_hz));
+}
 
 ImuMoments moments(std::span<const ImuSample> samples) {
   ImuMoments m;
@@ -94,7 +94,11 @@ ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured) {
   return imu;
 }
 
-double shaken_angle(const WhiteNoise& measured) { return scatter_of_integral(measured.gyro); }
+double shaken_angle(const WhiteNoise& measured, double mean_over_s) {
+  // The mean's spectrum goes with sinc^2(f T): integrated, within a tenth of this up to 0.15 s.
+  constexpr double kCut = 5;
+  return scatter_of_integral(measured.gyro) / std::hypot(1, kCut * kShakingEnds_hz * mean_over_s);
+}
 
 OdometryNeed missing_for_start(std::span<const ImuSample> samples,
                                const StaticInitialiserConfig& config) {

@@ -67,10 +67,17 @@ struct Standstill {
 /// The same for an accelerometer that is shaken so now: its bias is none the worse for it.
 [[nodiscard]] ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured);
 
+/// What is shaken stays where it is: its spectrum ends at some frequency, and its integral is
+/// bounded. 1 sigma, each axis, of the integral of readings of such a density: of density D above f
+/// it scatters by D / (2 pi sqrt(f)).
+[[nodiscard]] double scatter_of_integral(double density);
+
 /// 1 sigma, each axis, of the angle by which an IMU is shaken so against the vehicle, rad. It does
 /// not add up: the gyro's integral follows the shaking, and the vehicle stays where it is. So it is
 /// noise of whatever compares the two, and not of the motion; taken for the latter, every scan
 /// would turn the attitude as it likes, which is how a map gets tilted at lift-off.
-[[nodiscard]] double shaken_angle(const WhiteNoise& measured);
+///
+/// @param mean_over_s of the mean of the angle over so long, as a scan sees it; 0: at an instant
+[[nodiscard]] double shaken_angle(const WhiteNoise& measured, double mean_over_s = 0);
 
 }  // namespace arex

@@ -26,7 +26,7 @@ struct Circle {
   }
 };
 
-TEST(Undistortion, PutsEveryPointWhereItIsAtTheScansEnd) {
+TEST(Undistortion, PutsEveryPointWhereItIsAtOneInstant) {
   const Circle motion;
   std::vector<ImuSample> samples;
   for (Stamp t = 0; t <= 110'000'000; t += 5'000'000) samples.push_back(motion.imu(t));
@@ -40,28 +40,31 @@ TEST(Undistortion, PutsEveryPointWhereItIsAtTheScansEnd) {
     x = propagate(x, imu);
   }
 
-  RandomStream random(1, "points");
-  LidarScan scan;
-  scan.end = 100'000'000;
-  std::vector<Vec3> expected;
-  const Pose X_LO_end = (motion.at(0.1) * kXBL).inverse();
-  for (std::uint32_t i = 0; i < 20000; ++i) {
-    const double t = 5e-6 * i;
-    LidarPoint point;
-    point.offset_ns = i * 5000;
-    point.p_L = (10 * random.normal3().normalized()).cast<float>();
-    scan.points.push_back(point);
-    expected.push_back(X_LO_end * (motion.at(t) * (kXBL * point.p_L.cast<double>())));
+  for (const double instant : {0.1, 0.05, 0.02}) {
+    RandomStream random(1, "points");
+    LidarScan scan;
+    scan.end = 100'000'000;
+    std::vector<Vec3> expected;
+    const Pose X_LO = (motion.at(instant) * kXBL).inverse();
+    for (std::uint32_t i = 0; i < 20000; ++i) {
+      const double t = 5e-6 * i;
+      LidarPoint point;
+      point.offset_ns = i * 5000;
+      point.p_L = (10 * random.normal3().normalized()).cast<float>();
+      scan.points.push_back(point);
+      expected.push_back(X_LO * (motion.at(t) * (kXBL * point.p_L.cast<double>())));
+    }
+    const auto points =
+        undistort(scan, segments, motion.at(instant), kXBL, LidarNoiseConfig{}, 0.3);
+    ASSERT_EQ(points.size(), scan.points.size());
+    double worst = 0, distortion = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      worst = std::max(worst, (points[i].p_L.cast<double>() - expected[i]).norm());
+      distortion = std::max(distortion, (scan.points[i].p_L.cast<double>() - expected[i]).norm());
+    }
+    EXPECT_GT(distortion, 1.0);  // what there was to undo
+    EXPECT_LT(worst, 0.0015);
   }
-  const auto points = undistort(scan, segments, kXBL, LidarNoiseConfig{}, 0.3);
-  ASSERT_EQ(points.size(), scan.points.size());
-  double worst = 0, distortion = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    worst = std::max(worst, (points[i].p_L.cast<double>() - expected[i]).norm());
-    distortion = std::max(distortion, (scan.points[i].p_L.cast<double>() - expected[i]).norm());
-  }
-  EXPECT_GT(distortion, 2.0);  // what there was to undo
-  EXPECT_LT(worst, 0.001);     // the issue asks for 5 mm
 }
 
 // Packets are stamped with jitter: times run backwards, and end past the last segment.
@@ -92,8 +95,8 @@ TEST(Undistortion, GoesByThePointsOwnTimesInAnyOrder) {
     std::swap(shuffled.points[i],
               shuffled.points[static_cast<std::size_t>(random.uniform_int(0, 1999))]);
   }
-  const auto expected = undistort(in_order, segments, kXBL, LidarNoiseConfig{}, 0.3);
-  const auto points = undistort(shuffled, segments, kXBL, LidarNoiseConfig{}, 0.3);
+  const auto expected = undistort(in_order, segments, x.X_OB(), kXBL, LidarNoiseConfig{}, 0.3);
+  const auto points = undistort(shuffled, segments, x.X_OB(), kXBL, LidarNoiseConfig{}, 0.3);
   ASSERT_EQ(points.size(), 2000U);
   for (const ScanPoint& point : points) {
     const std::uint32_t i = shuffled.points[point.index].offset_ns / 50'330;
@@ -116,7 +119,7 @@ TEST(Undistortion, LeavesAStandingScanAsItIs) {
     point.offset_ns = i * 1'000'000;
     scan.points.push_back(point);
   }
-  const auto points = undistort(scan, {still}, kXBL, LidarNoiseConfig{}, 0.3);
+  const auto points = undistort(scan, {still}, {}, kXBL, LidarNoiseConfig{}, 0.3);
   ASSERT_EQ(points.size(), 100U);
   for (const ScanPoint& point : points) {
     EXPECT_LT((point.p_L - scan.points[point.index].p_L).norm(), 1e-5F);
@@ -141,7 +144,7 @@ TEST(Undistortion, DropsWhatIsNotTheWorld) {
   add({100, 0, 0});
   LidarNoiseConfig config;
   config.blind_m = 0.3;
-  const auto points = undistort(scan, {still}, kXBL, config, 0.3);
+  const auto points = undistort(scan, {still}, {}, kXBL, config, 0.3);
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points[0].index, 0U);
   EXPECT_EQ(points[1].index, 3U);

@@ -81,7 +81,7 @@ Result fly(bench::Flight& flight, const LidarInertialConfig& config, std::ofstre
     if (now.status != OdometryStatus::kInitialising) {
       fast.push_back({sample.stamp, flight.X_WB(sample.stamp), now.X_OB});
     }
-    if (pending && sample.stamp >= update.stamp + kLatency) {
+    if (pending && sample.stamp >= update.end + kLatency) {
       const Pose before = odometry.odometry().X_OB;
       const bool started = odometry.odometry().status != OdometryStatus::kInitialising;
       odometry.apply(update);

@@ -44,6 +44,8 @@ PoseCovariance distortion(const ImuNoiseConfig& noise, double scan_s) {
   return covariance;
 }
 
+Stamp middle_of(const LidarScan& scan) { return scan.stamp + (scan.end - scan.stamp) / 2; }
+
 }  // namespace
 
 ScanCorrector::ScanCorrector(const LidarInertialConfig& config, const Pose& X_BL,
@@ -172,45 +174,130 @@ void ScanCorrector::start_again() {
 
 std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan,
                                                            ScanUpdate& update) {
-  // A clipped gyro bends the scan. What the scan then says of the missing rate unbends it.
-  constexpr int kPasses = 4;
+  constexpr int kPasses = 3;
   constexpr double kSettled = 0.02;  // rad/s
-  const Stamp length = scan.end - scan.stamp, middle = scan.stamp + length / 2;
   const WhiteNoise shaking = white_noise(imu_.between(scan.end - kShakenFor, scan.end));
   filter_.set_noise(shaken_by(config_.imu, shaking));
   shaken_rad_ = stood_at_ ? 0 : shaken_angle(shaking);
-  const double mean_shaken_rad = stood_at_ ? 0 : shaken_angle(shaking, to_seconds(length));
+  const Vec3 clipped_s = clipped_time(scan).seconds;
+  const bool clipped = clipped_s.maxCoeff() > 0;
   const ErrorStateFilter before = filter_;
-  const GyroCompletion gyro_before = gyro_;
+  if (clipped && status_ != OdometryStatus::kLost) {
+    gyro_.missing_radps = likeliest_missing(scan, clipped_s);
+  }
+  Attempt made;
   for (int pass = 1;; ++pass) {
-    ClippedTime clipped;
-    std::vector<MotionSegment> segments = predict_to(middle, length, shaking, clipped);
-    if (stood_at_) hold_standstill(scan.end);
-    for (const MotionSegment& after : motion(middle, scan.end)) segments.push_back(after);
-    std::vector<ScanPoint> points = undistort(scan, segments, filter_.state().X_OB(),
-                                              filter_.state().X_BL, config_.lidar, body_radius_m_);
-    const std::vector<ScanPoint> downsampled = voxel_downsample(
-        points, config_.registration.scan_voxel_m, config_.registration.max_points);
-    update.gyro_clipped = clipped.any();
-    Vec3 missing = Vec3::Constant(GyroCompletion::kUntold);
-    if (status_ == OdometryStatus::kLost) {
-      update.recovered = recover(downsampled, update.registration);
-    } else {
-      const NavigationState predicted = filter_.state();
-      update.registration = register_scan(downsampled, map_, config_, mean_shaken_rad, filter_);
-      missing = missing_rates(clipped, local(predicted, filter_.state()).segment<3>(kRotation));
-    }
-    const double change = (missing - gyro_.missing_radps).norm();
-    if (!clipped.any() || change < kSettled || pass == kPasses) {
-      gyro_.missing_radps = missing;
-      stamp_ = middle;
-      imu_.forget_before(stamp_ - kShakenFor);
-      return points;
-    }
+    const GyroCompletion gyro_before = gyro_;
+    made = attempt(scan, shaking);
+    const double change = (made.missing_radps - gyro_before.missing_radps).norm();
+    if (!clipped || change < kSettled || pass == kPasses) break;
     filter_ = before;
     gyro_ = gyro_before;
-    gyro_.missing_radps = missing;
+    gyro_.missing_radps = made.missing_radps;
   }
+  gyro_.missing_radps = made.missing_radps;
+  update.registration = std::move(made.registration);
+  update.recovered = made.recovered;
+  update.gyro_clipped = clipped;
+  stamp_ = middle_of(scan);
+  imu_.forget_before(stamp_ - kShakenFor);
+  return std::move(made.points);
+}
+
+ClippedTime ScanCorrector::clipped_time(const LidarScan& scan) const {
+  ClippedTime clipped;
+  if (imu_.empty()) return clipped;
+  GyroCompletion gyro = gyro_;
+  for (ImuInterval& imu :
+       imu_intervals(imu_.samples(), stamp_, scan.end, accel_scale_, filter_.state().t_d)) {
+    gyro.complete(imu);
+    clipped.add(imu, gyro_.full_scale_radps);
+  }
+  return clipped;
+}
+
+Vec3 ScanCorrector::likeliest_missing(const LidarScan& scan, const Vec3& clipped_s) const {
+  // Drives change a rate by so much from scan to scan, and the search halves its steps so often.
+  constexpr double kReach = 2.0, kFirstStep = 0.5;  // rad/s
+  constexpr int kHalvings = 2;
+  constexpr std::size_t kScored = 1200;  // points
+  LidarScan thinned = scan;
+  const std::size_t every = std::max<std::size_t>(1, scan.points.size() / kScored);
+  thinned.points.clear();
+  for (std::size_t i = 0; i < scan.points.size(); i += every) {
+    thinned.points.push_back(scan.points[i]);
+  }
+  Eigen::Index axis = 0;
+  clipped_s.maxCoeff(&axis);
+  Vec3 best = gyro_.missing_radps;
+  const double centre = std::max(0.0, best[axis]);
+  double best_fit = -1;
+  const auto consider = [&](double missing) {
+    Vec3 guess = best;
+    guess[axis] = missing;
+    const double fit = missing < 0 ? -1 : fit_of(thinned, guess);
+    if (fit > best_fit) {
+      best_fit = fit;
+      best = guess;
+    }
+  };
+  for (double off = -kReach; off <= kReach; off += kFirstStep) consider(centre + off);
+  double step = kFirstStep;
+  for (int i = 0; i < kHalvings; ++i) {
+    step /= 2;
+    const double middle = best[axis];
+    consider(middle - step);
+    consider(middle + step);
+  }
+  return best;
+}
+
+double ScanCorrector::fit_of(const LidarScan& scan, const Vec3& missing_radps) const {
+  constexpr double kScale = 0.1;  // m from a surface that halve what a point counts
+  NavigationState x = filter_.state();
+  GyroCompletion gyro = gyro_;
+  gyro.missing_radps = missing_radps;
+  std::vector<MotionSegment> segments = motion(stamp_, middle_of(scan), x, gyro);
+  const Pose X_OB = x.X_OB();
+  for (const MotionSegment& after : motion(middle_of(scan), scan.end, x, gyro)) {
+    segments.push_back(after);
+  }
+  const Pose X_OL = X_OB * x.X_BL;
+  double fit = 0;
+  for (const ScanPoint& point :
+       undistort(scan, segments, X_OB, x.X_BL, config_.lidar, body_radius_m_)) {
+    const Vec3 p_O = X_OL * point.p_L.cast<double>();
+    const auto match = map_.find(p_O);
+    if (!match) continue;
+    const double off = match->normal.dot(p_O - match->mean) / kScale;
+    fit += 1 / (1 + off * off);
+  }
+  return fit;
+}
+
+ScanCorrector::Attempt ScanCorrector::attempt(const LidarScan& scan, const WhiteNoise& shaking) {
+  const Stamp length = scan.end - scan.stamp, middle = middle_of(scan);
+  Attempt made;
+  ClippedTime clipped;
+  std::vector<MotionSegment> segments = predict_to(middle, length, shaking, clipped);
+  if (stood_at_) hold_standstill(scan.end);
+  NavigationState x = filter_.state();
+  GyroCompletion gyro = gyro_;
+  for (const MotionSegment& after : motion(middle, scan.end, x, gyro)) segments.push_back(after);
+  made.points = undistort(scan, segments, filter_.state().X_OB(), filter_.state().X_BL,
+                          config_.lidar, body_radius_m_);
+  const std::vector<ScanPoint> downsampled = voxel_downsample(
+      made.points, config_.registration.scan_voxel_m, config_.registration.max_points);
+  if (status_ == OdometryStatus::kLost) {
+    made.recovered = recover(downsampled, made.registration);
+  } else {
+    const NavigationState predicted = filter_.state();
+    const double shaken_rad = stood_at_ ? 0 : shaken_angle(shaking, to_seconds(length));
+    made.registration = register_scan(downsampled, map_, config_, shaken_rad, filter_);
+    made.missing_radps =
+        missing_rates(clipped, local(predicted, filter_.state()).segment<3>(kRotation));
+  }
+  return made;
 }
 
 std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, Stamp scan_length,
@@ -231,11 +318,10 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, Stamp scan_len
   return segments;
 }
 
-std::vector<MotionSegment> ScanCorrector::motion(Stamp from, Stamp to) const {
+std::vector<MotionSegment> ScanCorrector::motion(Stamp from, Stamp to, NavigationState& x,
+                                                 GyroCompletion& gyro) const {
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
-  NavigationState x = filter_.state();
-  GyroCompletion gyro = gyro_;
   for (ImuInterval& imu : imu_intervals(imu_.samples(), from, to, accel_scale_, x.t_d)) {
     gyro.complete(imu);
     segments.push_back(motion_segment(x, imu));

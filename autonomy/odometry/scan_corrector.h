@@ -64,14 +64,30 @@ class ScanCorrector {
   void start_again();
   void forget_map();
   std::vector<ScanPoint> register_with_motion(const LidarScan& scan, ScanUpdate& update);
+  /// A scan undistorted and registered with what is taken to be missing of clipped readings.
+  struct Attempt {
+    std::vector<ScanPoint> points;
+    RegistrationReport registration;
+    bool recovered = false;
+    Vec3 missing_radps = Vec3::Constant(GyroCompletion::kUntold);  ///< by what it found
+  };
+  Attempt attempt(const LidarScan& scan, const WhiteNoise& shaking);
+  [[nodiscard]] ClippedTime clipped_time(const LidarScan& scan) const;
+  /// A clipped gyro turns a scan and bends it, so far perhaps that a registration does not find
+  /// where it belongs. Both hang on one figure, the rate that is missing: looks for the one with
+  /// which the points fit the map best.
+  [[nodiscard]] Vec3 likeliest_missing(const LidarScan& scan, const Vec3& clipped_s) const;
+  /// How well the points lie on the map's surfaces: each counts up to 1.
+  [[nodiscard]] double fit_of(const LidarScan& scan, const Vec3& missing_radps) const;
   /// Before take-off the vehicle is where it started: holds the filter there, by a
   /// pseudo-measurement, while it stands.
   void hold_standstill(Stamp until);
   /// @param scan_length of the scan that is predicted to
   std::vector<MotionSegment> predict_to(Stamp stamp, Stamp scan_length, const WhiteNoise& shaking,
                                         ClippedTime& clipped);
-  /// The motion that follows from the filter's state, which is that at `from`.
-  [[nodiscard]] std::vector<MotionSegment> motion(Stamp from, Stamp to) const;
+  /// The motion that follows from `x`, the state at `from`; becomes that at `to`.
+  [[nodiscard]] std::vector<MotionSegment> motion(Stamp from, Stamp to, NavigationState& x,
+                                                  GyroCompletion& gyro) const;
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);

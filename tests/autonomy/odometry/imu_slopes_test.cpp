@@ -123,8 +123,8 @@ TEST(ImuSlopes, ErrApartFromWhatAScanSees) {
   const WhiteNoise shaken{kDensity, 0};
   EXPECT_NEAR(shaken_angle(shaken) / std::sqrt(angle2 / kRuns), 1, 0.1);
   EXPECT_NEAR(shaken_angle(shaken, 0.1) / std::sqrt(mean2 / kRuns), 1, 0.15);
-  const ImuInterval told = slopes(sampled([](double) { return 0; }, 400'000'000), 150'000'000,
-                                  250'000'000, 0, shaken);
+  const ImuInterval told =
+      slopes(sampled([](double) { return 0; }, 400'000'000), 150'000'000, 250'000'000, 0, shaken);
   const double std = told.gyro_slope_noise.z() / std::sqrt(0.1);
   EXPECT_NEAR(std / std::sqrt(slope2 / kRuns), 1, 0.3);
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "math/mix.h"
 
@@ -52,11 +53,8 @@ SurfelMap::SurfelMap(const SurfelMapConfig& config) : config_(config) {
 }
 
 void SurfelMap::clear() {
-  const auto capacity = static_cast<std::size_t>(config_.capacity);
-  std::size_t slots = 1;
-  while (slots < 2 * capacity) slots *= 2;
   for (Level& level : levels_) {
-    level.slots.assign(slots, Slot{});
+    level.slots.assign(1024, Slot{});
     level.cells.clear();
     level.surfels.clear();
     level.hand = 0;
@@ -68,6 +66,18 @@ std::size_t SurfelMap::slot_of(const Level& level, std::uint64_t key) {
   std::size_t i = mix_bits(key) & mask;
   while (level.slots[i].cell != kNone && level.slots[i].key != key) i = (i + 1) & mask;
   return i;
+}
+
+void SurfelMap::make_slots(Level& level, std::size_t more_cells) const {
+  const std::size_t cells =
+      std::min(level.cells.size() + more_cells, static_cast<std::size_t>(config_.capacity));
+  std::size_t slots = level.slots.size();
+  while (slots < 2 * cells) slots *= 2;
+  if (slots == level.slots.size()) return;
+  const std::vector<Slot> before = std::exchange(level.slots, std::vector<Slot>(slots));
+  for (const Slot& slot : before) {
+    if (slot.cell != kNone) level.slots[slot_of(level, slot.key)] = slot;
+  }
 }
 
 void SurfelMap::erase_slot(Level& level, std::size_t hole) {
@@ -85,6 +95,12 @@ void SurfelMap::erase_slot(Level& level, std::size_t hole) {
 
 std::uint32_t SurfelMap::make_room(Level& level) const {
   if (level.cells.size() < static_cast<std::size_t>(config_.capacity)) {
+    if (level.cells.size() == level.cells.capacity()) {
+      // Doubling would hold twice what is used.
+      const std::size_t cells = level.cells.size() + level.cells.size() / 8 + 1024;
+      level.cells.reserve(cells);
+      level.surfels.reserve(cells);
+    }
     level.cells.emplace_back();
     level.surfels.emplace_back();
     return static_cast<std::uint32_t>(level.cells.size() - 1);
@@ -125,6 +141,7 @@ void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> v
   points_G.reserve(points_O.size());
   for (const Vec3f& p_O : points_O) points_G.emplace_back(kR_GO * p_O.cast<double>());
   for (Level& level : levels_) {
+    make_slots(level, points_O.size());
     const std::size_t mask = level.slots.size() - 1;
     std::array<std::uint64_t, kAhead> keys{};
     const auto look_ahead = [&](std::size_t i) {

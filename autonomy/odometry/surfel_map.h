@@ -108,6 +108,8 @@ class SurfelMap {
 
   /// The slot that holds `key`, or the empty one where it would go.
   static std::size_t slot_of(const Level& level, std::uint64_t key);
+  /// Room for so many cells more, a slot taken for each two.
+  void make_slots(Level& level, std::size_t more_cells) const;
   Slot& obtain(Level& level, std::uint64_t key, int insertion);
   [[nodiscard]] std::uint32_t make_room(Level& level) const;
   static void erase_slot(Level& level, std::size_t hole);

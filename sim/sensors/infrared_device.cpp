@@ -2,6 +2,8 @@
 
 #include <span>
 
+#include "sensors/infrared_pair.h"
+
 namespace arex::sim {
 namespace {
 
@@ -27,6 +29,8 @@ InfraredDevice::InfraredDevice(const InfraredConfig& config, const D430Config& u
       lane_(jobs_.add_lane("infrared")),
       outlets_(context.outlets),
       auto_exposure_(config.sensor) {}
+
+InfraredDevice::~InfraredDevice() = default;
 
 void InfraredDevice::fire(const Moment& moment) {
   const Stamp opened = from_seconds(static_cast<double>(frame_) / config_.rate_hz);

@@ -4,11 +4,14 @@
 #include <memory>
 #include <optional>
 
+#include "sensors/d430_stereo.h"
 #include "sensors/device.h"
 #include "sensors/infrared_exposure.h"
-#include "sensors/infrared_pair.h"
+#include "sensors/infrared_shot.h"
 
 namespace arex::sim {
+
+class InfraredPair;
 
 /// The infrared pair of a flight. Shutters open at the rate; each frame's exposure is chosen then,
 /// by the frames delivered so far.
@@ -19,6 +22,7 @@ class InfraredDevice : public Device {
   /// @param X_BC_drawn where the drawings have it
   InfraredDevice(const InfraredConfig& config, const D430Config& unit, const Pose& X_BC_drawn,
                  const DeviceContext& context);
+  ~InfraredDevice() override;
 
   void fire(const Moment& moment) override;
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sensors/infrared_config.h"
-#include "sensors/infrared_imager.h"
+#include "sensors/infrared_shot.h"
 
 namespace arex::sim {
 

@@ -5,21 +5,9 @@
 
 #include "messages/sensors.h"
 #include "sensors/infrared_config.h"
-#include "sensors/infrared_shader.h"
+#include "sensors/infrared_shot.h"
 
 namespace arex::sim {
-
-/// How an imager is set for one frame.
-struct InfraredExposure {
-  double exposure_s = 0.0085;
-  double gain = 1;
-};
-
-/// How a camera moves, in its own frame C.
-struct CameraTwist {
-  Vec3 v_C = Vec3::Zero();  ///< of its origin, m/s
-  Vec3 w_C = Vec3::Zero();  ///< rad/s
-};
 
 /// Where the image of a point moves, px/s: of a standing point seen along the ray (x, y, 1) at
 /// inverse depth q (1/m).
@@ -45,12 +33,17 @@ class InfraredImager {
 
  private:
   void smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist);
+  void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist);
+  [[nodiscard]] float mean_along(const std::vector<float>& in, int u, int v, float du,
+                                 float dv) const;
   void spread();
   void read(const InfraredExposure& exposure, std::uint64_t seed, std::vector<std::uint8_t>& grey);
 
   InfraredSensorConfig config_;
   PinholeCamera camera_;
-  std::vector<float> vignette_;  ///< share of the light that comes through, of each pixel
+  std::vector<float> vignette_;       ///< share of the light that comes through, of each pixel
+  std::vector<float> column_x_;       ///< (u - cx) / fx
+  std::vector<float> way_u_, way_v_;  ///< of a row's pixels, px
   std::vector<float> smeared_, rows_, spread_;
 };
 

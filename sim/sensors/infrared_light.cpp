@@ -14,9 +14,9 @@ constexpr int kMostAlong = 400;             // an axis
 constexpr double kLampReach = 9;            // further lamps give less than 2 lx, m
 constexpr double kLampNearest = 1.0;        // a strip is no point: nearer counts as this, m
 constexpr double kLampUp = 0.05;            // share of its intensity that goes up and sideways
-constexpr float kBuried = 0.08F;            // a node that near to a surface may lie in a slab, m
 constexpr double kMostAlbedo = 0.8;         // retro-reflectors send little anywhere else
-constexpr double kGroundAlbedo = 0.25;      // of what lies outside of the world
+constexpr double kFurtherBounces = 1.35;  // 1 / (1 - albedo): light is followed for one bounce only
+constexpr double kGroundAlbedo = 0.25;    // of what lies outside of the world
 constexpr double kPi = std::numbers::pi;
 
 using Faces = std::array<double, 6>;
@@ -58,17 +58,6 @@ struct Surroundings {
     }
     scene.cast(rays, hits);
   }
-  /// False inside of slabs and under the ground, where nobody looks from.
-  [[nodiscard]] bool is_open(const std::array<Vec3, kRays>& directions) const {
-    int down = 0, ground = 0;
-    for (std::size_t i = 0; i < kRays; ++i) {
-      if (hits[i].valid() && hits[i].distance_m < kBuried) return false;
-      if (directions[i].z() > -0.3) continue;
-      ++down;
-      ground += hits[i].valid();
-    }
-    return 2 * ground >= down;
-  }
 };
 
 /// Makes the light of the nodes of one grid.
@@ -83,16 +72,14 @@ class Baker {
     intensity_ = light.lamp_flux_lm / (kPi * (1 + kLampUp));
   }
 
-  /// From sky and lamps. @return whether the node lies in the open
-  bool direct(const Vec3& p, Faces& faces) {
+  /// From sky and lamps.
+  void direct(const Vec3& p, Faces& faces) {
     around_.look(scene_, p, directions_);
-    if (!around_.is_open(directions_)) return false;
     for (std::size_t i = 0; i < kRays; ++i) {
       if (around_.hits[i].valid()) continue;
       add_from(directions_[i], (directions_[i].z() > 0 ? sky_ : ground_) * kSolidAngle, faces);
     }
     for (const Lamp& lamp : lamps_) add_lamp(lamp, p, faces);
-    return true;
   }
   /// What the surfaces around send on of it, and of the sun.
   void indirect(const Vec3& p, const LightGrid& grid, Faces& faces) {
@@ -102,7 +89,7 @@ class Baker {
       if (!hit.valid()) continue;
       const double albedo = std::min(static_cast<double>(hit.reflectivity), kMostAlbedo);
       const double lux = illuminance(hit, p.cast<float>(), directions_[i].cast<float>(), grid);
-      add_from(directions_[i], albedo * lux / kPi * kSolidAngle, faces);
+      add_from(directions_[i], kFurtherBounces * albedo * lux / kPi * kSolidAngle, faces);
     }
   }
 
@@ -182,6 +169,44 @@ Vec3 LightGrid::node(std::size_t index) const {
   return p;
 }
 
+/// A node inside of a slab, or in the void under the ground, is dark or light for reasons that no
+/// surface in sight shares.
+std::vector<std::uint8_t> LightGrid::find_open(const worlds::World& world,
+                                               const Scene& scene) const {
+  const std::array<std::size_t, 3> stride{
+      1, static_cast<std::size_t>(count_[0]),
+      static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1])};
+  const auto sees = [&](const Vec3& from, const Vec3& to) {
+    const Vec3 way = to - from;
+    const double length = way.norm();
+    return length < 1e-6 || !scene.cast(from, way / length, length).valid();
+  };
+  std::vector<std::uint8_t> open(faces_.size(), 0);
+  std::vector<std::size_t> reached;
+  const Vec3 start = world.X_WS * Vec3(0, 0, 1);
+  for (std::size_t i = 0; i < faces_.size(); ++i) {
+    const Vec3 p = node(i);
+    if ((p - start).norm() > 2 * spacing_ || !sees(start, p)) continue;
+    open[i] = 1;
+    reached.push_back(i);
+  }
+  for (std::size_t k = 0; k < reached.size(); ++k) {
+    const std::size_t i = reached[k];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto count = static_cast<std::size_t>(count_[axis]);
+      const std::size_t place = i / stride[axis] % count;
+      for (const bool up : {false, true}) {
+        if (up ? place + 1 == count : place == 0) continue;
+        const std::size_t next = up ? i + stride[axis] : i - stride[axis];
+        if (open[next] || !sees(node(i), node(next))) continue;
+        open[next] = 1;
+        reached.push_back(next);
+      }
+    }
+  }
+  return open;
+}
+
 /// Nodes inside of something take the mean of their neighbours, so that none of their darkness
 /// shows on the surfaces beside them.
 void LightGrid::fill(std::vector<std::uint8_t>& open) {
@@ -215,18 +240,17 @@ LightGrid::LightGrid(const InfraredLightConfig& light, const worlds::World& worl
                      const Scene& scene, const SunMap& sun, const std::vector<Lamp>& lamps) {
   place_nodes(light, world);
   Baker baker(light, scene, sun, lamps);
-  std::vector<std::uint8_t> open(faces_.size(), 0);
+  std::vector<std::uint8_t> open = find_open(world, scene);
   std::vector<Faces> light_of(faces_.size(), Faces{});
   for (std::size_t i = 0; i < faces_.size(); ++i) {
-    open[i] = baker.direct(node(i), light_of[i]);
+    if (open[i]) baker.direct(node(i), light_of[i]);
     faces_[i] = packed(light_of[i]);
   }
   std::vector<std::uint8_t> filled = open;
   fill(filled);
-  std::vector<Float8> with_bounce(faces_);
+  std::vector<Float8> with_bounce(faces_.size(), Float8{});
   for (std::size_t i = 0; i < faces_.size(); ++i) {
-    if (!open[i]) continue;
-    baker.indirect(node(i), *this, light_of[i]);
+    if (open[i]) baker.indirect(node(i), *this, light_of[i]);
     with_bounce[i] = packed(light_of[i]);
   }
   faces_ = std::move(with_bounce);

@@ -70,6 +70,9 @@ class LightGrid {
   }
   void place_nodes(const InfraredLightConfig& light, const worlds::World& world);
   [[nodiscard]] Vec3 node(std::size_t index) const;
+  /// Which nodes light gets to from the start, from node to node.
+  [[nodiscard]] std::vector<std::uint8_t> find_open(const worlds::World& world,
+                                                    const Scene& scene) const;
   void fill(std::vector<std::uint8_t>& open);
 
   std::array<int, 3> count_{2, 2, 2};

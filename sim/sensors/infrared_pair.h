@@ -9,20 +9,11 @@
 #include "sensors/infrared_config.h"
 #include "sensors/infrared_imager.h"
 #include "sensors/infrared_shader.h"
+#include "sensors/infrared_shot.h"
 #include "sensors/scene.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
-
-/// One frame to be taken.
-struct InfraredShot {
-  Stamp stamp = 0;             ///< middle of the exposure
-  Pose X_WB;                   ///< then
-  Vec3 v_WB = Vec3::Zero();    ///< of B's origin, in W, m/s
-  Vec3 w_WB_B = Vec3::Zero();  ///< in B, rad/s
-  InfraredExposure exposure;
-  bool right = true;  ///< read the right eye, too
-};
 
 /// The D430's left and right infrared imagers in a world. Frame C: the left one's, that of the
 /// depth image; z forward, x right, y down.

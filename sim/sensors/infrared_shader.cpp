@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 namespace arex::sim {
 namespace {
@@ -17,6 +18,12 @@ PinholeCamera finer(const PinholeCamera& camera, int samples) {
   const double shift = 0.5 * (samples - 1);
   return {samples * camera.width, samples * camera.height,     samples * camera.fx,
           samples * camera.fy,    samples * camera.cx + shift, samples * camera.cy + shift};
+}
+
+Float8 root(const Float8& v) {
+  Float8 out;
+  for (int i = 0; i < 8; ++i) out[i] = std::sqrt(v[i]);
+  return out;
 }
 
 /// How dark a joint between panels makes a pixel that covers `footprint` at a distance from it.
@@ -47,7 +54,7 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
       renderer_(world, fine_, {.far_m = light.draw_range_m}),
       lamp_lx_(static_cast<float>(light.lamp_flux_lm / kStripArea)),
       pixel_rad_(static_cast<float>(1 / camera.fx)),
-      off_surface_m_(static_cast<float>(0.5 * grid_.spacing_m())) {
+      off_surface_m_(static_cast<float>(0.75 * grid_.spacing_m())) {
   for (int u = 0; u < camera.width; ++u) {
     column_x_.push_back(static_cast<float>((u - camera.cx) / camera.fx));
   }
@@ -79,17 +86,86 @@ float InfraredShader::surface(const View& view, std::uint32_t triangle, const Ve
     return light * textured(facet, material, view.eye_W + z * ray_W, ray_W, z, towards);
   }
   const Vec3f p = view.eye_W + z * ray_W;
-  const Vec3f normal = from_behind ? Vec3f(-facet.normal_W) : facet.normal_W;
-  const Float8 flipped = __builtin_shuffle(facet.weights, Int8{1, 0, 3, 2, 5, 4, 7, 6});
-  const Float8& near = from_behind ? flipped : facet.weights;
-  const Float8& far = from_behind ? facet.weights : flipped;
-  const Float8 faces = grid_.at(p + off_surface_m_ * normal);
-  float lux = LightGrid::sum(faces, near);
-  if (material.translucency > 0) lux += material.translucency * LightGrid::sum(faces, far);
-  const float facing = normal.dot(sun_.direction_W());
-  const float share = facing > 0 ? facing : -facing * material.translucency;
-  if (share * sun_lx_ > 0) lux += share * sun_lx_ * sun_.visible(p);
+  const Side side = side_of(facet, material, from_behind);
+  float lux = indirect(side, material, p);
+  if (side.sun_lx > 0) lux += side.sun_lx * sun_.visible(p);
   return facet.albedo * lux * textured(facet, material, p, ray_W, z, towards);
+}
+
+InfraredShader::Side InfraredShader::side_of(const SurfaceFacet& facet, const Material& material,
+                                             bool from_behind) const {
+  const Float8 flipped = __builtin_shuffle(facet.weights, Int8{1, 0, 3, 2, 5, 4, 7, 6});
+  Side side{from_behind ? Vec3f(-facet.normal_W) : facet.normal_W,
+            from_behind ? flipped : facet.weights, from_behind ? facet.weights : flipped};
+  const float facing = side.normal_W.dot(sun_.direction_W());
+  side.sun_lx = sun_lx_ * (facing > 0 ? facing : -facing * material.translucency);
+  return side;
+}
+
+float InfraredShader::indirect(const Side& side, const Material& material, const Vec3f& p) const {
+  const Float8 faces = grid_.at(p + off_surface_m_ * side.normal_W);
+  const float lux = LightGrid::sum(faces, side.near);
+  if (material.translucency == 0) return lux;
+  return lux + material.translucency * LightGrid::sum(faces, side.far);
+}
+
+bool InfraredShader::is_even(std::size_t first_sample) const {
+  const std::uint32_t* above = &triangles_[first_sample];
+  const std::uint32_t* below = above + fine_.width;
+  std::uint32_t different = above[0] ^ below[0];
+  for (std::size_t i = 1; i < 16; ++i) different |= (above[i] ^ above[0]) | (below[i] ^ above[0]);
+  return different == 0 && above[0] != Renderer::kNoTriangle;
+}
+
+/// @param u the first of them
+void InfraredShader::eight_pixels(const View& view, const Vec3f& row_W, int u,
+                                  std::size_t first_sample, float* light,
+                                  float* inverse_depth) const {
+  const SurfaceFacet& facet = surfaces_.facet(triangles_[first_sample]);
+  const Material& material = surfaces_.material(facet);
+  Float8 x, q;
+  const float* above = &fine_inverse_depth_[first_sample];
+  const float* below = above + fine_.width;
+  for (int i = 0; i < 8; ++i) {
+    x[i] = column_x_[static_cast<std::size_t>(u + i)];
+    q[i] = 0.25F * ((above[2 * i] + above[2 * i + 1]) + (below[2 * i] + below[2 * i + 1]));
+  }
+  std::memcpy(inverse_depth, &q, sizeof q);
+  const Float8 z = 1 / q;
+  std::array<Float8, 3> ray, p;
+  Float8 towards{}, squared{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<Eigen::Index>(axis);
+    ray[axis] = row_W[k] + x * view.right_W[k];
+    p[axis] = view.eye_W[k] + z * ray[axis];
+    towards += facet.normal_W[k] * ray[axis];
+    squared += ray[axis] * ray[axis];
+  }
+  Float8 lux;
+  const bool from_behind = towards[0] > 0;
+  if (facet.glows || facet.small) {
+    lux = (facet.glows ? lamp_lx_ : from_behind ? facet.back : facet.front) - Float8{};
+  } else {
+    // The baked light is smooth: known at both ends, it is known between.
+    const auto at = [&](int i) { return Vec3f(p[0][i], p[1][i], p[2][i]); };
+    const Side side = side_of(facet, material, from_behind);
+    const float begin = indirect(side, material, at(0)), end = indirect(side, material, at(7));
+    lux = begin + (end - begin) * (1.0F / 7) * Float8{0, 1, 2, 3, 4, 5, 6, 7};
+    for (int i = 0; i < 8 && side.sun_lx > 0; ++i) lux[i] += side.sun_lx * sun_.visible(at(i));
+    lux *= facet.albedo;
+  }
+  if (!facet.glows) {
+    const Float8 cosine = (towards < 0 ? -towards : towards) / root(squared);
+    const Float8 slant = cosine < kLeastSlant ? kLeastSlant - Float8{} : cosine;
+    const Float8 footprint = z * pixel_rad_ / slant;
+    const Float8 &a = p[facet.first_axis], &b = p[facet.second_axis];
+    lux *= texture_at(material, facet.key, a, b, footprint);
+    for (int i = 0; i < 8 && material.seam_m > 0; ++i) {
+      lux[i] *=
+          seam(a[i], material.seam_m, footprint[i]) * seam(b[i], material.seam_m, footprint[i]);
+    }
+  }
+  std::memcpy(light, &lux, sizeof lux);
 }
 
 /// @param row_W the ray through the row's pixel of column cx
@@ -145,12 +221,21 @@ void InfraredShader::draw(const Pose& X_WC, InfraredScene& out) {
       static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height);
   out.light_lx.resize(pixels);
   out.inverse_depth.resize(pixels);
-  std::size_t i = 0;
   for (int v = 0; v < camera_.height; ++v) {
     const auto y = static_cast<float>((v - camera_.cy) / camera_.fy);
     const Vec3f row_W = y * R.col(1) + R.col(2);
-    for (int u = 0; u < camera_.width; ++u, ++i) {
-      out.light_lx[i] = pixel(view, row_W, u, v, out.inverse_depth[i]);
+    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(camera_.width);
+    float* light = &out.light_lx[row];
+    float* inverse_depth = &out.inverse_depth[row];
+    for (int u = 0; u < camera_.width;) {
+      const std::size_t first = kSamples * (kSamples * row + static_cast<std::size_t>(u));
+      if (u + 8 <= camera_.width && is_even(first)) {
+        eight_pixels(view, row_W, u, first, light + u, inverse_depth + u);
+        u += 8;
+        continue;
+      }
+      const int end = std::min(u + 8, camera_.width);
+      for (; u < end; ++u) light[u] = pixel(view, row_W, u, v, inverse_depth[u]);
     }
   }
 }

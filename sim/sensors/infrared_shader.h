@@ -11,6 +11,7 @@
 #include "sensors/infrared_lamps.h"
 #include "sensors/infrared_light.h"
 #include "sensors/infrared_materials.h"
+#include "sensors/infrared_shot.h"
 #include "sensors/infrared_sun.h"
 #include "sensors/renderer.h"
 #include "sensors/scene.h"
@@ -18,19 +19,13 @@
 
 namespace arex::sim {
 
-/// What a pinhole sees at one moment, before optics, shutter and sensor.
-struct InfraredScene {
-  std::vector<float> light_lx;       ///< of each pixel, rows from the top: as a white surface's
-  std::vector<float> inverse_depth;  ///< 1/z, 1/m: the mean over the pixel; 0 where all is backdrop
-};
-
 /// Draws a world as an infrared camera sees it.
 ///
 /// The rasteriser finds the triangle of four samples in each pixel; what differs among them is
-/// shaded for itself, what is the same once. A surface is its albedo with a procedural texture,
-/// under the sun where it shines, and under the baked light of sky, lamps and other surfaces. All
-/// of it is sums, products, quotients and square roots in a fixed order: the same bits on every
-/// host.
+/// shaded for itself, what is the same once, and eight pixels of one triangle at a time. A surface
+/// is its albedo with a procedural texture, under the sun where it shines, and under the baked
+/// light of sky, lamps and other surfaces. All of it is sums, products, quotients and square roots
+/// in a fixed order: the same bits on every host.
 class InfraredShader {
  public:
   /// The world is copied; it need not outlive the shader, nor need the scene.
@@ -60,6 +55,19 @@ class InfraredShader {
                               float inverse_depth) const;
   [[nodiscard]] float textured(const SurfaceFacet& facet, const Material& material, const Vec3f& p,
                                const Vec3f& ray_W, float z, float towards) const;
+  /// Where a facet shows the eye which side, under what light from sky, lamps and surfaces.
+  struct Side {
+    Vec3f normal_W;
+    Float8 near, far;  ///< weights of the side seen, and of the other
+    float sun_lx = 0;  ///< where the sun reaches it
+  };
+  [[nodiscard]] Side side_of(const SurfaceFacet& facet, const Material& material,
+                             bool from_behind) const;
+  [[nodiscard]] float indirect(const Side& side, const Material& material, const Vec3f& p) const;
+  /// Whether all samples of eight pixels show one triangle, which is no backdrop.
+  [[nodiscard]] bool is_even(std::size_t first_sample) const;
+  void eight_pixels(const View& view, const Vec3f& row_W, int u, std::size_t first_sample,
+                    float* light, float* inverse_depth) const;
   [[nodiscard]] float pixel(const View& view, const Vec3f& row_W, int u, int v,
                             float& inverse_depth) const;
 

@@ -176,5 +176,22 @@ TEST(Texture, IsContinuousAndItsOwnOnEachObject) {
   EXPECT_GT(difference / 5000, 0.05);
 }
 
+TEST(Texture, IsTheSameForEightPlacesAtOnce) {
+  const Material material = noise_material({2, 0.5F, 0.12F, 0.03F}, {0.2F, 0.2F, 0.2F, 0.2F}, 0.4F);
+  RandomStream random(9, "places");
+  for (int n = 0; n < 500; ++n) {
+    Float8 a, b, footprint;
+    for (int i = 0; i < 8; ++i) {
+      a[i] = static_cast<float>(random.uniform(-50, 50));
+      b[i] = static_cast<float>(random.uniform(-50, 50));
+      footprint[i] = static_cast<float>(random.uniform(0.001, 0.5));
+    }
+    const Float8 together = texture_at(material, 5, a, b, footprint);
+    for (int i = 0; i < 8; ++i) {
+      EXPECT_NEAR(together[i], texture_at(material, 5, a[i], b[i], footprint[i]), 1e-5);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace arex::sim

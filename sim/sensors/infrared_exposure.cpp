@@ -8,6 +8,7 @@ namespace {
 
 // A frame that is all black or all white says no more than that it is wrong by this much.
 constexpr double kMostChange = 6;
+constexpr double kWhite = 247;
 constexpr double kDeadBand = 0.04;  // relative error of the mean that is let stand
 
 }  // namespace
@@ -28,7 +29,8 @@ AutoExposure::AutoExposure(const InfraredSensorConfig& config)
 
 void AutoExposure::add(double mean, const InfraredExposure& taken) {
   if (!config_.auto_exposure) return;
-  const double error = config_.mean_target / std::max(mean, 1.0);
+  double error = config_.mean_target / std::max(mean, 1.0);
+  if (mean > kWhite) error = 1 / kMostChange;
   if (std::abs(error - 1) < kDeadBand) return;
   const double change =
       std::pow(std::clamp(error, 1 / kMostChange, kMostChange), config_.exposure_gain);

@@ -10,6 +10,7 @@ namespace {
 constexpr int kRays = 32;                   // from each node
 constexpr double kReach = 60;               // of a ray, m
 constexpr std::size_t kMostNodes = 40'000;  // a second or two of rays
+constexpr double kLeastSide = 1;            // of a world, m
 constexpr int kMostAlong = 400;             // an axis
 constexpr double kLampReach = 9;            // further lamps give less than 2 lx, m
 constexpr double kLampNearest = 1.0;        // a strip is no point: nearer counts as this, m
@@ -45,6 +46,13 @@ Float8 packed(const Faces& faces) {
   Float8 out{};
   for (int i = 0; i < 6; ++i) out[i] = static_cast<float>(faces[static_cast<std::size_t>(i)]);
   return out;
+}
+
+Eigen::AlignedBox3d bounds_of(const worlds::World& world) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3f& vertex : world.mesh.vertices) box.extend(vertex.cast<double>());
+  if (box.isEmpty()) box = Eigen::AlignedBox3d(Vec3::Zero(), Vec3::Zero());
+  return {box.min(), box.min() + box.sizes().cwiseMax(kLeastSide)};
 }
 
 /// What the rays of one node met.
@@ -132,10 +140,8 @@ class Baker {
 }  // namespace
 
 void LightGrid::place_nodes(const InfraredLightConfig& light, const worlds::World& world) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3f& vertex : world.mesh.vertices) box.extend(vertex.cast<double>());
-  if (box.isEmpty()) box = Eigen::AlignedBox3d(Vec3::Zero(), Vec3::Ones());
-  const Vec3 size = box.sizes().cwiseMax(1.0);
+  const Eigen::AlignedBox3d box = bounds_of(world);
+  const Vec3 size = box.sizes();
   const auto counts = [&](double spacing) {
     std::array<int, 3> count{};
     std::size_t nodes = 1;
@@ -181,12 +187,18 @@ std::vector<std::uint8_t> LightGrid::find_open(const worlds::World& world,
     const double length = way.norm();
     return length < 1e-6 || !scene.cast(from, way / length, length).valid();
   };
+  // Nor is there a way round the world's edge, under its ground.
+  const Eigen::AlignedBox3d box = bounds_of(world);
+  const auto beside = [&](const Vec3& p) {
+    return (p.head<2>().array() <= box.min().head<2>().array()).any() ||
+           (p.head<2>().array() >= box.max().head<2>().array()).any();
+  };
   std::vector<std::uint8_t> open(faces_.size(), 0);
   std::vector<std::size_t> reached;
   const Vec3 start = world.X_WS * Vec3(0, 0, 1);
   for (std::size_t i = 0; i < faces_.size(); ++i) {
     const Vec3 p = node(i);
-    if ((p - start).norm() > 2 * spacing_ || !sees(start, p)) continue;
+    if ((p - start).norm() > 2 * spacing_ || beside(p) || !sees(start, p)) continue;
     open[i] = 1;
     reached.push_back(i);
   }
@@ -198,7 +210,7 @@ std::vector<std::uint8_t> LightGrid::find_open(const worlds::World& world,
       for (const bool up : {false, true}) {
         if (up ? place + 1 == count : place == 0) continue;
         const std::size_t next = up ? i + stride[axis] : i - stride[axis];
-        if (open[next] || !sees(node(i), node(next))) continue;
+        if (open[next] || beside(node(next)) || !sees(node(i), node(next))) continue;
         open[next] = 1;
         reached.push_back(next);
       }

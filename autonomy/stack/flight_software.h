@@ -18,6 +18,7 @@
 #include "messages/odometry_need.h"
 #include "messages/operator.h"
 #include "messages/sensors.h"
+#include "messages/stereo_image.h"
 #include "mission/mission.h"
 #include "planning/local_planner.h"
 
@@ -63,6 +64,7 @@ class FlightSoftware {
   virtual void add_mocap(const MocapSample& mocap) = 0;
   virtual void add_scan(const LidarScanPtr& scan) = 0;
   virtual void add_depth(const DepthImagePtr& depth) = 0;
+  virtual void add_images(const StereoImagePtr& /*images*/) {}
   /// Whether the frame that a camera exposed at `stamp` will be read; the driver drops the others.
   /// To be asked once for each frame. @param device its name, empty: the first
   [[nodiscard]] virtual bool accepts_depth(const std::string& device, Stamp stamp) = 0;

@@ -18,6 +18,8 @@
 #include "messages/odometry_need.h"
 #include "messages/operator.h"
 #include "messages/sensors.h"
+#include "messages/stereo_image.h"
+#include "messages/visual_tracks.h"
 #include "mission/mission.h"
 #include "planning/local_planner.h"
 
@@ -27,6 +29,7 @@ namespace arex {
 struct NamedOdometry {
   std::string_view name;
   const Odometry* odometry = nullptr;
+  std::optional<VisualTally> tally{};  ///< of a visual one
 };
 
 /// What onlookers may see of the flight software between two ticks. Refers to it: to be asked for
@@ -45,6 +48,7 @@ struct FlightView {
   double known_volume_m3;                        ///< when map_2d was taken
   const PlanCounts& plans;
   OdometryNeed need;  ///< what keeps the odometry from being ok
+  std::optional<VisualTally> tally{};  ///< of a visual odometry that was to fly from the start
 };
 
 /// The flight software as the vehicle around it knows it: fed with what the sensors deliver, in the
@@ -63,6 +67,7 @@ class FlightSoftware {
   virtual void add_mocap(const MocapSample& mocap) = 0;
   virtual void add_scan(const LidarScanPtr& scan) = 0;
   virtual void add_depth(const DepthImagePtr& depth) = 0;
+  virtual void add_images(const StereoImagePtr& /*images*/) {}
   /// Whether the frame that a camera exposed at `stamp` will be read; the driver drops the others.
   /// To be asked once for each frame. @param device its name, empty: the first
   [[nodiscard]] virtual bool accepts_depth(const std::string& device, Stamp stamp) = 0;
@@ -73,6 +78,8 @@ class FlightSoftware {
   /// What happened, and what the explorer decided, since the last call.
   virtual std::vector<Event> take_events() = 0;
   virtual std::vector<Decision> take_decisions() = 0;
+  /// What the newest exposure showed to a visual odometry, if one has come since the last call.
+  virtual std::vector<FeatureSight> take_features() { return {}; }
 
   [[nodiscard]] virtual FlightView view() const = 0;
 

@@ -96,6 +96,8 @@ ImuNoiseConfig shaken_by(ImuNoiseConfig imu, const WhiteNoise& measured) {
 
 double shaken_angle(const WhiteNoise& measured) { return scatter_of_integral(measured.gyro); }
 
+double shaken_speed(const WhiteNoise& measured) { return scatter_of_integral(measured.accel); }
+
 OdometryNeed missing_for_start(std::span<const ImuSample> samples,
                                const StaticInitialiserConfig& config) {
   if (samples.size() < 2) return OdometryNeed::kImu;

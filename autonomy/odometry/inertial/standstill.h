@@ -73,4 +73,7 @@ struct Standstill {
 /// would turn the attitude as it likes, which is how a map gets tilted at lift-off.
 [[nodiscard]] double shaken_angle(const WhiteNoise& measured);
 
+/// The same of the accelerometer's integral, m/s.
+[[nodiscard]] double shaken_speed(const WhiteNoise& measured);
+
 }  // namespace arex

@@ -37,27 +37,17 @@ struct Path {
   Vec3 in_eye;
 };
 
-/// The frame's pose when it was exposed by this t_d.
-FrameState exposed(const FrameState& x, const FrameTiming& timing, double t_d) {
-  FrameState moved = x;
-  const double late_s = t_d - timing.placed_by;
-  moved.R_OB = x.R_OB * so3::Exp(late_s * timing.rate);
-  moved.p_OB = x.p_OB + late_s * x.v_OB;
-  return moved;
-}
-
-Path path_of(const Sight& s, const FrameState& i, const FrameState& j, const CameraState& camera,
-             double rho) {
+Path path_of(const Sight& s, const Exposure& i, const Exposure& j, const CameraState& camera,
+             const LandmarkState& landmark) {
+  const double rho = landmark.inverse_depth;
   Path path;
-  path.ray = s.anchor.left.homogeneous();
+  path.ray = landmark.ray.homogeneous();
   path.in_Bi = camera.X_BC.R * path.ray + rho * camera.X_BC.p;
   path.in_Bj = j.R_OB.transpose() * (i.R_OB * path.in_Bi + rho * (i.p_OB - j.p_OB));
   path.in_Cj = camera.X_BC.R.transpose() * (path.in_Bj - rho * camera.X_BC.p);
   path.in_eye = path.in_Cj - (s.right ? rho * s.baseline_m : 0.0) * Vec3::UnitX();
   return path;
 }
-
-bool own_right(const Sight& s) { return &s.anchor == &s.seen; }
 
 }  // namespace
 
@@ -128,38 +118,37 @@ ImuJacobian imu_whitening(const Preintegration& imu) {
   return W;
 }
 
-std::optional<Vec2> sight_residual(const Sight& sight, const FrameState& anchor,
-                                   const FrameState& seen, const CameraState& camera,
-                                   double inverse_depth) {
-  if (own_right(sight)) {
-    // Both eyes are exposed at once.
-    return Vec2(sight.anchor.left - inverse_depth * sight.baseline_m * Vec2::UnitX() -
-                *sight.anchor.right);
-  }
-  const Vec3 p = path_of(sight, exposed(anchor, sight.anchor_timing, camera.t_d),
-                         exposed(seen, sight.seen_timing, camera.t_d), camera, inverse_depth)
-                     .in_eye;
-  if (p.z() < kLeastForward * p.norm()) return std::nullopt;
+Exposure::Exposure(const FrameState& x, const FrameTiming& timing, double t_d)
+    : R_OB(x.R_OB), p_OB(x.p_OB), v_OB(x.v_OB), rate(timing.rate), turn(Mat3::Identity()) {
+  const double late_s = t_d - timing.placed_by;
+  if (late_s == 0) return;
+  turn = so3::Exp(-late_s * rate);
+  R_OB = x.R_OB * turn.transpose();
+  p_OB += late_s * v_OB;
+}
+
+std::optional<Vec2> sight_residual(const Sight& sight, const Exposure& anchor,
+                                   const Exposure& seen, const CameraState& camera,
+                                   const LandmarkState& landmark) {
   const Vec2& z = sight.right ? *sight.seen.right : sight.seen.left;
+  if (sight.own) {
+    const double disparity = sight.right ? landmark.inverse_depth * sight.baseline_m : 0;
+    return Vec2(landmark.ray - disparity * Vec2::UnitX() - z);
+  }
+  const Vec3 p = path_of(sight, anchor, seen, camera, landmark).in_eye;
+  if (p.z() < kLeastForward * p.norm()) return std::nullopt;
   return Vec2(p.head<2>() / p.z() - z);
 }
 
-SightJacobians sight_jacobians(const Sight& sight, const FrameState& placed_anchor,
-                               const FrameState& placed_seen, const CameraState& camera,
-                               double inverse_depth) {
+SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor, const Exposure& seen,
+                               const CameraState& camera, const LandmarkState& landmark) {
   SightJacobians J;
-  if (own_right(sight)) {
-    J.anchor.setZero();
-    J.seen.setZero();
-    J.camera.setZero();
-    J.inverse_depth = -sight.baseline_m * Vec2::UnitX();
+  if (sight.own) {
+    J.landmark << Eigen::Matrix2d::Identity(), (sight.right ? -sight.baseline_m : 0.0) * Vec2::UnitX();
     return J;
   }
-  const double rho = inverse_depth;
-  const FrameTiming &at_anchor = sight.anchor_timing, &at_seen = sight.seen_timing;
-  const FrameState anchor = exposed(placed_anchor, at_anchor, camera.t_d);
-  const FrameState seen = exposed(placed_seen, at_seen, camera.t_d);
-  const Path path = path_of(sight, anchor, seen, camera, rho);
+  const double rho = landmark.inverse_depth;
+  const Path path = path_of(sight, anchor, seen, camera, landmark);
   const Vec3& p = path.in_eye;
   Eigen::Matrix<double, 2, 3> D;  // of the projection
   D << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
@@ -168,21 +157,16 @@ SightJacobians sight_jacobians(const Sight& sight, const FrameState& placed_anch
   const Eigen::Matrix<double, 2, 3> by_Bj = D * R_BC.transpose();
   const Eigen::Matrix<double, 2, 3> by_O = by_Bj * seen.R_OB.transpose();
   const Eigen::Matrix<double, 2, 3> by_Bi = by_O * anchor.R_OB;
-  J.anchor.leftCols<3>() = -by_Bi * so3::hat(path.in_Bi);
-  J.anchor.rightCols<3>() = rho * by_O;
-  J.seen.leftCols<3>() = by_Bj * so3::hat(path.in_Bj);
-  J.seen.rightCols<3>() = -rho * by_O;
   const Eigen::Matrix<double, 2, 3> by_ray = by_Bi * R_BC;
-  J.camera.leftCols<3>() = -by_ray * so3::hat(path.ray) + D * so3::hat(path.in_Cj);
-  J.camera.middleCols<3>(3) = rho * (by_Bi - by_Bj);
-  J.camera.col(kCameraTime) =
-      J.anchor.leftCols<3>() * at_anchor.rate + J.anchor.rightCols<3>() * anchor.v_OB +
-      J.seen.leftCols<3>() * at_seen.rate + J.seen.rightCols<3>() * seen.v_OB;
-  // An error of the placed attitude is one of the exposed, turned by what lies between.
-  J.anchor.leftCols<3>() *= so3::Exp(-(camera.t_d - at_anchor.placed_by) * at_anchor.rate);
-  J.seen.leftCols<3>() *= so3::Exp(-(camera.t_d - at_seen.placed_by) * at_seen.rate);
-  J.inverse_depth = by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) -
-                    by_Bj * camera.X_BC.p - (sight.right ? sight.baseline_m : 0.0) * D.col(0);
+  const Eigen::Matrix<double, 2, 3> by_anchor = -by_Bi * so3::hat(path.in_Bi);
+  const Eigen::Matrix<double, 2, 3> by_seen = by_Bj * so3::hat(path.in_Bj);
+  J.anchor << by_anchor * anchor.turn, rho * by_O;
+  J.seen << by_seen * seen.turn, -rho * by_O;
+  J.camera << D * so3::hat(path.in_Cj) - by_ray * so3::hat(path.ray), rho * (by_Bi - by_Bj),
+      by_anchor * anchor.rate + by_seen * seen.rate + rho * by_O * (anchor.v_OB - seen.v_OB);
+  J.landmark << by_ray.leftCols<2>(),
+      by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) - by_Bj * camera.X_BC.p -
+          (sight.right ? sight.baseline_m : 0.0) * D.col(0);
   return J;
 }
 

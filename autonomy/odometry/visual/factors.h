@@ -34,28 +34,38 @@ struct FrameTiming {
   Vec3 rate = Vec3::Zero();  ///< of the body, rad/s, in B
 };
 
+/// The body when a frame was exposed.
+struct Exposure {
+  Exposure(const FrameState& x, const FrameTiming& timing, double t_d);
+
+  Mat3 R_OB;
+  Vec3 p_OB;
+  Vec3 v_OB, rate;  ///< how it moves with t_d
+  Mat3 turn;        ///< takes an error of the placed attitude to one of this
+};
+
 /// One eye's view of a landmark.
 struct Sight {
-  const Observation& anchor;
-  const Observation& seen;  ///< the anchor itself: its right eye
-  FrameTiming anchor_timing, seen_timing;
+  const Observation& seen;
+  bool own = false;    ///< by the frame whose ray the landmark lies on
   bool right = false;
   double baseline_m = 0;
 };
 
 /// Normalised coordinates predicted minus seen; nothing for what would lie behind the camera.
-[[nodiscard]] std::optional<Vec2> sight_residual(const Sight& sight, const FrameState& anchor,
-                                                 const FrameState& seen, const CameraState& camera,
-                                                 double inverse_depth);
+[[nodiscard]] std::optional<Vec2> sight_residual(const Sight& sight, const Exposure& anchor,
+                                                 const Exposure& seen, const CameraState& camera,
+                                                 const LandmarkState& landmark);
 struct SightJacobians {
-  Eigen::Matrix<double, 2, kPoseDim> anchor, seen;
+  Eigen::Matrix<double, 2, kPoseDim> anchor, seen;  ///< by the placed poses
   Eigen::Matrix<double, 2, kCameraDim> camera;
-  Vec2 inverse_depth;
+  Eigen::Matrix<double, 2, kLandmarkDim> landmark;
 };
+/// Of the anchor's own sights, the landmark's part alone is set: on the rest they do not hang.
 /// @pre sight_residual() has a value there
-[[nodiscard]] SightJacobians sight_jacobians(const Sight& sight, const FrameState& anchor,
-                                             const FrameState& seen, const CameraState& camera,
-                                             double inverse_depth);
+[[nodiscard]] SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor,
+                                             const Exposure& seen, const CameraState& camera,
+                                             const LandmarkState& landmark);
 
 /// The inverse depth that brings a landmark's rays together best, 1/m, by linear least squares;
 /// that of kBackdrop where they meet behind it, infinity included, by no more than noise; nothing

@@ -28,14 +28,12 @@ LinearRows stacked(const std::vector<LinearRows>& parts) {
 LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   const WindowLayout layout = window.layout();
   const int n = layout.visual_size();
-  NormalEquations equations;
-  equations.H = Eigen::MatrixXd::Zero(layout.size(), layout.size());
-  equations.g = Eigen::VectorXd::Zero(layout.size());
-  equations.W.resize(n, 0);
+  NormalEquations equations = empty_equations(window);
+  const WindowExposures exposures(window, noise);
   for (auto& [id, landmark] : window.landmarks) {
     if (landmark.seen.front().frame != window.frames.front().number) continue;
     if (noise.uses(landmark)) {
-      add_landmark(window, landmark, noise, window.newest().number, equations);
+      add_landmark(window, exposures, landmark, noise, window.newest().number, equations);
     }
   }
   const ReducedEquations reduced = reduce(equations, 0);
@@ -55,7 +53,8 @@ double inverse_depth_from(const Window& window, const Landmark& landmark, const 
     return Pose{x.R_OB, x.p_OB} * window.camera.X_BC;
   };
   const Vec3 p = pose(seen).inverse() *
-                 (pose(anchor) * Vec3(anchor.left.homogeneous() / landmark.inverse_depth));
+                 (pose(anchor) * Vec3(landmark.state.ray.homogeneous() /
+                                          landmark.state.inverse_depth));
   constexpr double kNearest = 0.1;  // m
   return p.z() > kNearest ? 1 / p.z() : 0;
 }
@@ -69,14 +68,14 @@ void leave_oldest(Window& window, const WindowNoise& noise) {
       if (noise.uses(landmark)) {
         const Observation last = landmark.seen.back();
         if (last.frame == newest) {
-          landmark.inverse_depth = inverse_depth_from(window, landmark, last);
+          landmark.state = {last.left, inverse_depth_from(window, landmark, last)};
           landmark.seen = {last};
         } else {
           landmark.seen.clear();
         }
       } else {
         landmark.seen.erase(landmark.seen.begin());
-        landmark.inverse_depth = 0;
+        if (!landmark.seen.empty()) landmark.state = {landmark.seen.front().left, 0};
       }
     }
     it = landmark.seen.empty() ? window.landmarks.erase(it) : std::next(it);

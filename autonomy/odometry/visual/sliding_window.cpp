@@ -110,34 +110,35 @@ void SlidingWindow::observe(const FeatureFrame& features, WindowUpdate& update) 
     Landmark& landmark = window_.landmarks[feature.id];
     update.fresh += landmark.seen.empty();
     landmark.id = feature.id;
+    if (landmark.seen.empty()) landmark.state.ray = feature.left;
     landmark.seen.push_back({number, feature.left, feature.right});
   }
 }
 
 void SlidingWindow::triangulate_new() {
   for (auto& [id, landmark] : window_.landmarks) {
-    if (landmark.inverse_depth > 0 || landmark.images() < 2) continue;
+    if (landmark.state.inverse_depth > 0 || landmark.images() < 2) continue;
     std::vector<const FrameState*> frames;
     for (const Observation& o : landmark.seen) {
       frames.push_back(&window_.frames[static_cast<std::size_t>(window_.slot(o.frame))].state);
     }
-    landmark.inverse_depth =
+    landmark.state.inverse_depth =
         triangulate(landmark, frames, window_.camera, noise_.baseline_m).value_or(0);
   }
 }
 
 double SlidingWindow::median_innovation_px() const {
   const std::int64_t newest = window_.newest().number;
+  const WindowExposures exposures(window_, noise_);
   std::vector<double> off;
   for (const auto& [id, landmark] : window_.landmarks) {
     const Observation& last = landmark.seen.back();
-    if (landmark.inverse_depth <= 0 || landmark.seen.size() < 2 || last.frame != newest) continue;
-    const WindowFrame& anchor =
-        window_.frames[static_cast<std::size_t>(window_.slot(landmark.seen.front().frame))];
-    const Sight sight{landmark.seen.front(), last,  anchor.timing,
-                      window_.newest().timing, false, noise_.baseline_m};
-    const auto r = sight_residual(sight, anchor.state, window_.newest().state, window_.camera,
-                                  landmark.inverse_depth);
+    if (landmark.state.inverse_depth <= 0 || landmark.seen.size() < 2 || last.frame != newest) {
+      continue;
+    }
+    const auto anchor = static_cast<std::size_t>(window_.slot(landmark.seen.front().frame));
+    const auto r = sight_residual({last, false, false, noise_.baseline_m}, exposures.now[anchor],
+                                  exposures.now.back(), window_.camera, landmark.state);
     if (r) off.push_back(focal_px_ * r->norm());
   }
   if (off.empty()) return 0;
@@ -171,10 +172,11 @@ bool SlidingWindow::is_keyframe(const WindowUpdate& update) const {
 void SlidingWindow::drop_outliers(WindowUpdate& update) {
   const double most = config_.outlier_px / config_.pixel_std;
   const std::int64_t newest = window_.newest().number;
+  const WindowExposures exposures(window_, noise_);
   for (auto it = window_.landmarks.begin(); it != window_.landmarks.end();) {
     const Landmark& landmark = it->second;
     if (noise_.uses(landmark)) {
-      const auto residual = mean_residual(window_, landmark, noise_);
+      const auto residual = mean_residual(window_, exposures, landmark, noise_);
       if (!residual || *residual > most) {
         update.outliers.push_back(landmark.id);
         it = window_.landmarks.erase(it);

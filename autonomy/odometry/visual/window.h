@@ -76,7 +76,7 @@ struct WindowNoise {
 
   /// Whether the landmark counts.
   [[nodiscard]] bool uses(const Landmark& landmark) const {
-    return landmark.inverse_depth > 0 && landmark.seen.size() >= 2 &&
+    return landmark.state.inverse_depth > 0 && landmark.seen.size() >= 2 &&
            landmark.images() >= least_images;
   }
 };

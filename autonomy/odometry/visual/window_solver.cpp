@@ -11,16 +11,8 @@ namespace {
 // behind it would keep it from coming back.
 constexpr double kFurthest = 1000;
 
-NormalEquations empty_equations(const Window& window) {
-  const WindowLayout layout = window.layout();
-  NormalEquations out;
-  out.H = Eigen::MatrixXd::Zero(layout.size(), layout.size());
-  out.g = Eigen::VectorXd::Zero(layout.size());
-  out.W.resize(layout.visual_size(), 0);
-  return out;
-}
-
 void add_rows(const LinearRows& rows, NormalEquations& out) {
+  if (rows.J.rows() == 0) return;
   out.H.selfadjointView<Eigen::Lower>().rankUpdate(rows.J.transpose());
   out.g.noalias() += rows.J.transpose() * rows.r;
   out.cost += 0.5 * rows.r.squaredNorm();
@@ -60,11 +52,11 @@ Robust huber(double sigma, double limit) {
   return {limit / sigma, limit * (sigma - 0.5 * limit)};
 }
 
-/// Moves the window's states and inverse depths; what it was.
+/// Moves the window's states and landmarks; what it was.
 struct Undo {
   std::vector<FrameState> states;
   CameraState camera;
-  std::vector<double> inverse_depths;
+  std::vector<LandmarkState> landmarks;
 };
 
 Undo apply(Window& window, const NormalEquations& equations, const WindowStep& step) {
@@ -81,9 +73,11 @@ Undo apply(Window& window, const NormalEquations& equations, const WindowStep& s
   }
   window.camera = retract(window.camera, step.states.segment<kCameraDim>(layout.camera()));
   for (std::size_t l = 0; l < equations.terms.size(); ++l) {
-    double& rho = equations.terms[l].landmark->inverse_depth;
-    undo.inverse_depths.push_back(rho);
-    rho = std::max(rho + step.inverse_depths[static_cast<Eigen::Index>(l)], 1 / kFurthest);
+    LandmarkState& state = equations.terms[l].landmark->state;
+    undo.landmarks.push_back(state);
+    const Vec3 d = step.landmarks.segment<kLandmarkDim>(kLandmarkDim * static_cast<Eigen::Index>(l));
+    state.ray += d.head<2>();
+    state.inverse_depth = std::max(state.inverse_depth + d.z(), 1 / kFurthest);
   }
   return undo;
 }
@@ -92,33 +86,24 @@ void take_back(Window& window, const NormalEquations& equations, const Undo& und
   for (std::size_t k = 0; k < undo.states.size(); ++k) window.frames[k].state = undo.states[k];
   window.camera = undo.camera;
   for (std::size_t l = 0; l < equations.terms.size(); ++l) {
-    equations.terms[l].landmark->inverse_depth = undo.inverse_depths[l];
+    equations.terms[l].landmark->state = undo.landmarks[l];
   }
 }
 
-/// Calls `visit(sight, slot of the observer)` for each of a landmark's sights.
+/// Calls `visit(sight, slot of the anchor, slot of the observer)` for each of a landmark's sights.
 template <class Visit>
 void for_each_sight(const Window& window, const Landmark& landmark, const WindowNoise& noise,
                     std::int64_t left_out, const Visit& visit) {
   const Observation& anchor = landmark.seen.front();
-  const int anchor_slot = window.slot(anchor.frame);
-  const FrameTiming& anchor_timing = window.frames[static_cast<std::size_t>(anchor_slot)].timing;
+  const auto anchor_slot = static_cast<std::size_t>(window.slot(anchor.frame));
   for (const Observation& seen : landmark.seen) {
     if (seen.frame == left_out) continue;
-    const int slot = window.slot(seen.frame);
-    const FrameTiming& timing = window.frames[static_cast<std::size_t>(slot)].timing;
-    Sight sight{anchor, seen, anchor_timing, timing, false, noise.baseline_m};
-    if (&seen != &anchor) visit(sight, anchor_slot, slot);
+    const auto slot = static_cast<std::size_t>(window.slot(seen.frame));
+    Sight sight{seen, &seen == &anchor, false, noise.baseline_m};
+    visit(sight, anchor_slot, slot);
     sight.right = true;
     if (seen.right) visit(sight, anchor_slot, slot);
   }
-}
-
-std::optional<Vec2> residual_of(const Window& window, const Landmark& landmark, const Sight& sight,
-                                int anchor, int seen) {
-  return sight_residual(sight, window.frames[static_cast<std::size_t>(anchor)].state,
-                        window.frames[static_cast<std::size_t>(seen)].state, window.camera,
-                        landmark.inverse_depth);
 }
 
 }  // namespace
@@ -167,31 +152,50 @@ LinearRows imu_rows(const Window& window, int to, const WindowNoise& noise) {
   return rows;
 }
 
-void add_landmark(const Window& window, Landmark& landmark, const WindowNoise& noise,
-                  std::int64_t left_out, NormalEquations& out) {
+NormalEquations empty_equations(const Window& window) {
+  const WindowLayout layout = window.layout();
+  NormalEquations out;
+  out.H = Eigen::MatrixXd::Zero(layout.size(), layout.size());
+  out.g = Eigen::VectorXd::Zero(layout.size());
+  out.W.resize(layout.visual_size(), 0);
+  return out;
+}
+
+WindowExposures::WindowExposures(const Window& window, const WindowNoise& noise) {
+  for (int k = 0; k < window.layout().frames; ++k) {
+    const WindowFrame& frame = window.frames[static_cast<std::size_t>(k)];
+    now.emplace_back(frame.state, frame.timing, window.camera.t_d);
+    linearised.emplace_back(linearised_at(window, k, noise), frame.timing, window.camera.t_d);
+  }
+}
+
+void add_landmark(const Window& window, const WindowExposures& exposures, Landmark& landmark,
+                  const WindowNoise& noise, std::int64_t left_out, NormalEquations& out) {
   const WindowLayout layout = window.layout();
   const int camera = layout.camera();
   const double scale = 1 / noise.ray_std;
-  NormalEquations::LandmarkTerm term{&landmark, 0, 0};
-  Eigen::VectorXd w = Eigen::VectorXd::Zero(layout.visual_size());
-  for_each_sight(window, landmark, noise, left_out, [&](const Sight& sight, int a, int s) {
-    const auto residual = residual_of(window, landmark, sight, a, s);
+  NormalEquations::LandmarkTerm term;
+  term.landmark = &landmark;
+  Eigen::Matrix<double, Eigen::Dynamic, kLandmarkDim> W =
+      Eigen::MatrixXd::Zero(layout.visual_size(), kLandmarkDim);
+  const auto visit = [&](const Sight& sight, std::size_t a, std::size_t s) {
+    const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s], window.camera,
+                                         landmark.state);
     if (!residual) return;
     const Robust robust = huber(scale * residual->norm(), noise.huber_sigma);
     out.cost += robust.cost;
     const double factor = scale * std::sqrt(robust.weight);
     const Vec2 r = factor * *residual;
-    SightJacobians J =
-        sight_jacobians(sight, linearised_at(window, a, noise), linearised_at(window, s, noise),
-                        window.camera, landmark.inverse_depth);
-    const Vec2 by_depth = factor * J.inverse_depth;
-    term.h += by_depth.squaredNorm();
-    term.g += by_depth.dot(r);
-    if (a == s) return;  // hangs on the depth alone
+    SightJacobians J = sight_jacobians(sight, exposures.linearised[a], exposures.linearised[s],
+                                       window.camera, landmark.state);
+    J.landmark *= factor;
+    term.H.noalias() += J.landmark.transpose() * J.landmark;
+    term.g.noalias() += J.landmark.transpose() * r;
+    if (sight.own) return;
     J.anchor *= factor;
     J.seen *= factor;
     J.camera *= factor;
-    const int pa = layout.pose(a), ps = layout.pose(s);
+    const int pa = layout.pose(static_cast<int>(a)), ps = layout.pose(static_cast<int>(s));
     out.H.block<kPoseDim, kPoseDim>(pa, pa).noalias() += J.anchor.transpose() * J.anchor;
     out.H.block<kPoseDim, kPoseDim>(ps, ps).noalias() += J.seen.transpose() * J.seen;
     out.H.block<kPoseDim, kPoseDim>(ps, pa).noalias() += J.seen.transpose() * J.anchor;
@@ -202,14 +206,16 @@ void add_landmark(const Window& window, Landmark& landmark, const WindowNoise& n
     out.g.segment<kPoseDim>(pa).noalias() += J.anchor.transpose() * r;
     out.g.segment<kPoseDim>(ps).noalias() += J.seen.transpose() * r;
     out.g.segment<kCameraDim>(camera).noalias() += J.camera.transpose() * r;
-    w.segment<kPoseDim>(pa).noalias() += J.anchor.transpose() * by_depth;
-    w.segment<kPoseDim>(ps).noalias() += J.seen.transpose() * by_depth;
-    w.segment<kCameraDim>(camera).noalias() += J.camera.transpose() * by_depth;
-  });
-  if (term.h <= 0) return;
-  const auto column = static_cast<Eigen::Index>(out.terms.size());
-  if (out.W.cols() <= column) out.W.conservativeResize(Eigen::NoChange, 2 * column + 32);
-  out.W.col(column) = w;
+    W.middleRows<kPoseDim>(pa).noalias() += J.anchor.transpose() * J.landmark;
+    W.middleRows<kPoseDim>(ps).noalias() += J.seen.transpose() * J.landmark;
+    W.middleRows<kCameraDim>(camera).noalias() += J.camera.transpose() * J.landmark;
+  };
+  for_each_sight(window, landmark, noise, left_out, visit);
+  // Without a depth its ray says nothing of the frames.
+  if (term.H(2, 2) <= 0) return;
+  const Eigen::Index column = kLandmarkDim * static_cast<Eigen::Index>(out.terms.size());
+  if (out.W.cols() <= column) out.W.conservativeResize(Eigen::NoChange, 2 * column + 96);
+  out.W.middleCols<kLandmarkDim>(column) = W;
   out.terms.push_back(term);
 }
 
@@ -217,25 +223,31 @@ NormalEquations linearise(Window& window, const WindowNoise& noise) {
   NormalEquations out = empty_equations(window);
   add_rows(prior_rows(window), out);
   for (int to = 1; to < window.layout().frames; ++to) add_imu(window, to, noise, out);
+  const WindowExposures exposures(window, noise);
   for (auto& [id, landmark] : window.landmarks) {
-    if (noise.uses(landmark)) add_landmark(window, landmark, noise, -1, out);
+    if (noise.uses(landmark)) add_landmark(window, exposures, landmark, noise, -1, out);
   }
-  out.W.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(out.terms.size()));
   return out;
 }
 
 ReducedEquations reduce(const NormalEquations& equations, double lambda) {
   ReducedEquations out{equations.H, equations.g};
   out.H.diagonal() *= 1 + lambda;
+  if (equations.terms.empty()) return out;
   const Eigen::Index n = equations.W.rows();
-  const auto count = static_cast<Eigen::Index>(equations.terms.size());
-  Eigen::MatrixXd scaled(n, count);
-  Eigen::VectorXd rest(count);
-  for (Eigen::Index l = 0; l < count; ++l) {
-    const auto& term = equations.terms[static_cast<std::size_t>(l)];
-    const double root = 1 / std::sqrt((1 + lambda) * term.h);
-    scaled.col(l) = root * equations.W.col(l);
-    rest[l] = root * term.g;
+  const Eigen::Index columns = kLandmarkDim * static_cast<Eigen::Index>(equations.terms.size());
+  Eigen::MatrixXd scaled(n, columns);
+  Eigen::VectorXd rest(columns);
+  Eigen::Index column = 0;
+  for (const auto& term : equations.terms) {
+    Mat3 damped = term.H;
+    damped.diagonal() *= 1 + lambda;
+    const Mat3 L = damped.llt().matrixL();
+    const Mat3 inverse = L.triangularView<Eigen::Lower>().solve(Mat3::Identity());
+    scaled.middleCols<kLandmarkDim>(column).noalias() =
+        equations.W.middleCols<kLandmarkDim>(column) * inverse.transpose();
+    rest.segment<kLandmarkDim>(column) = inverse * term.g;
+    column += kLandmarkDim;
   }
   out.H.topLeftCorner(n, n).selfadjointView<Eigen::Lower>().rankUpdate(scaled, -1);
   out.g.head(n).noalias() -= scaled * rest;
@@ -246,11 +258,16 @@ WindowStep solve(const NormalEquations& equations, double lambda) {
   const ReducedEquations reduced = reduce(equations, lambda);
   WindowStep step;
   step.states = -reduced.H.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
-  step.inverse_depths =
-      equations.W.transpose() * step.states.head(equations.W.rows());
-  for (Eigen::Index l = 0; l < step.inverse_depths.size(); ++l) {
-    const auto& term = equations.terms[static_cast<std::size_t>(l)];
-    step.inverse_depths[l] = -(term.g + step.inverse_depths[l]) / ((1 + lambda) * term.h);
+  const Eigen::Index columns = kLandmarkDim * static_cast<Eigen::Index>(equations.terms.size());
+  step.landmarks =
+      equations.W.leftCols(columns).transpose() * step.states.head(equations.W.rows());
+  Eigen::Index column = 0;
+  for (const auto& term : equations.terms) {
+    Mat3 damped = term.H;
+    damped.diagonal() *= 1 + lambda;
+    auto d = step.landmarks.segment<kLandmarkDim>(column);
+    d = -damped.llt().solve(Vec3(term.g + d)).eval();
+    column += kLandmarkDim;
   }
   return step;
 }
@@ -264,7 +281,7 @@ SolveReport optimise(Window& window, const WindowNoise& noise, int iterations, d
   while (report.iterations < iterations) {
     ++report.iterations;
     const WindowStep step = solve(equations, lambda);
-    if (!step.states.allFinite() || !step.inverse_depths.allFinite()) {
+    if (!step.states.allFinite() || !step.landmarks.allFinite()) {
       lambda = std::min(kMostDamping, 100 * lambda);
       continue;
     }
@@ -297,13 +314,14 @@ SolveReport optimise(Window& window, const WindowNoise& noise, int iterations, d
   return report;
 }
 
-std::optional<double> mean_residual(const Window& window, const Landmark& landmark,
-                                    const WindowNoise& noise) {
+std::optional<double> mean_residual(const Window& window, const WindowExposures& exposures,
+                                    const Landmark& landmark, const WindowNoise& noise) {
   double sum = 0;
   int count = 0;
   bool behind = false;
-  for_each_sight(window, landmark, noise, -1, [&](const Sight& sight, int a, int s) {
-    const auto residual = residual_of(window, landmark, sight, a, s);
+  for_each_sight(window, landmark, noise, -1, [&](const Sight& sight, std::size_t a, std::size_t s) {
+    const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s], window.camera,
+                                         landmark.state);
     behind |= !residual;
     if (residual) sum += residual->norm() / noise.ray_std;
     ++count;

@@ -83,11 +83,19 @@ struct Observation {
   std::optional<Vec2> right;
 };
 
-/// A point fixed in O, by its inverse depth along the ray of its first observation's left eye.
+/// A point fixed in O, as the left eye of the frame that saw it first has it. Its ray is estimated,
+/// too: a sight that were taken as exact there would lend its noise to all others. Error, 3x1:
+/// [ray, inverse depth].
+struct LandmarkState {
+  Vec2 ray = Vec2::Zero();   ///< normalised coordinates
+  double inverse_depth = 0;  ///< 1/m, along the optical axis; 0: not known yet
+};
+inline constexpr int kLandmarkDim = 3;
+
 struct Landmark {
   std::int64_t id = 0;
   std::vector<Observation> seen;  ///< in order of frames, the anchor first
-  double inverse_depth = 0;       ///< 1/m; 0: not known yet
+  LandmarkState state;
 
   /// Images of either eye.
   [[nodiscard]] int images() const {

@@ -90,7 +90,7 @@ struct Scene {
     b.v_OB = random.normal3();
     of_a = {0.001, random.normal3()};
     of_b = {0.007, random.normal3()};
-    inverse_depth = random.uniform(0.05, 0.4);
+    point = {anchor.left, random.uniform(0.05, 0.4)};
   }
   static Mat3 MatForward() {
     Mat3 R;
@@ -102,7 +102,7 @@ struct Scene {
   FrameState a, b;
   Observation anchor, seen;
   FrameTiming of_a, of_b;
-  double inverse_depth;
+  LandmarkState point;
 };
 
 TEST(SightFactor, DerivativesAreThoseOfTheResidual) {
@@ -110,16 +110,20 @@ TEST(SightFactor, DerivativesAreThoseOfTheResidual) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     const Scene s(seed);
     for (const bool right : {false, true}) {
-      const Sight sight{s.anchor, s.seen, s.of_a, s.of_b, right, 0.05};
+      const Sight sight{s.seen, false, right, 0.05};
       const auto r = [&](const FrameState& a, const FrameState& b, const CameraState& c,
-                         double rho) { return *sight_residual(sight, a, b, c, rho); };
-      const SightJacobians J = sight_jacobians(sight, s.a, s.b, s.camera, s.inverse_depth);
+                         const LandmarkState& point) {
+        return *sight_residual(sight, {a, s.of_a, c.t_d}, {b, s.of_b, c.t_d}, c, point);
+      };
+      const SightJacobians J =
+          sight_jacobians(sight, {s.a, s.of_a, s.camera.t_d}, {s.b, s.of_b, s.camera.t_d},
+                          s.camera, s.point);
       for (int i = 0; i < kPoseDim; ++i) {
-        const Vec2 by_a = (r(retract(s.a, unit(i, h)), s.b, s.camera, s.inverse_depth) -
-                           r(retract(s.a, unit(i, -h)), s.b, s.camera, s.inverse_depth)) /
+        const Vec2 by_a = (r(retract(s.a, unit(i, h)), s.b, s.camera, s.point) -
+                           r(retract(s.a, unit(i, -h)), s.b, s.camera, s.point)) /
                           (2 * h);
-        const Vec2 by_b = (r(s.a, retract(s.b, unit(i, h)), s.camera, s.inverse_depth) -
-                           r(s.a, retract(s.b, unit(i, -h)), s.camera, s.inverse_depth)) /
+        const Vec2 by_b = (r(s.a, retract(s.b, unit(i, h)), s.camera, s.point) -
+                           r(s.a, retract(s.b, unit(i, -h)), s.camera, s.point)) /
                           (2 * h);
         EXPECT_LT((by_a - J.anchor.col(i)).norm(), 1e-7) << i;
         EXPECT_LT((by_b - J.seen.col(i)).norm(), 1e-7) << i;
@@ -127,50 +131,57 @@ TEST(SightFactor, DerivativesAreThoseOfTheResidual) {
       for (int i = 0; i < kCameraDim; ++i) {
         CameraError d = CameraError::Zero();
         d[i] = h;
-        const Vec2 by = (r(s.a, s.b, retract(s.camera, d), s.inverse_depth) -
-                         r(s.a, s.b, retract(s.camera, -d), s.inverse_depth)) /
+        const Vec2 by = (r(s.a, s.b, retract(s.camera, d), s.point) -
+                         r(s.a, s.b, retract(s.camera, -d), s.point)) /
                         (2 * h);
-        EXPECT_LT((by - J.camera.col(i)).norm(), 1e-7) << i;
+        EXPECT_LT((by - J.camera.col(i)).norm(), 1e-6) << i;
       }
-      const Vec2 by = (r(s.a, s.b, s.camera, s.inverse_depth + h) -
-                       r(s.a, s.b, s.camera, s.inverse_depth - h)) /
-                      (2 * h);
-      EXPECT_LT((by - J.inverse_depth).norm(), 1e-7);
+      for (int i = 0; i < kLandmarkDim; ++i) {
+        const Vec3 d = h * Vec3::Unit(i);
+        const LandmarkState plus{s.point.ray + d.head<2>(), s.point.inverse_depth + d.z()};
+        const LandmarkState minus{s.point.ray - d.head<2>(), s.point.inverse_depth - d.z()};
+        const Vec2 by = (r(s.a, s.b, s.camera, plus) - r(s.a, s.b, s.camera, minus)) / (2 * h);
+        EXPECT_LT((by - J.landmark.col(i)).norm(), 1e-7) << i;
+      }
     }
   }
 }
 
-TEST(SightFactor, OwnRightEyeHangsOnTheDepthAlone) {
+TEST(SightFactor, OfTheAnchorHangsOnTheLandmarkAlone) {
   Scene s(5);
   s.anchor.right = s.anchor.left - Vec2(0.2 * 0.05, 0);
-  const Sight sight{s.anchor, s.anchor, s.of_a, s.of_a, true, 0.05};
-  EXPECT_LT(sight_residual(sight, s.a, s.a, s.camera, 0.2)->norm(), 1e-12);
-  const SightJacobians J = sight_jacobians(sight, s.a, s.a, s.camera, 0.2);
-  EXPECT_TRUE(J.anchor.isZero(0) && J.seen.isZero(0) && J.camera.isZero(0));
-  EXPECT_NEAR(J.inverse_depth.x(), -0.05, 1e-12);
+  const Exposure placed(s.a, s.of_a, s.camera.t_d);
+  const LandmarkState point{s.anchor.left, 0.2};
+  for (const bool right : {false, true}) {
+    const Sight sight{s.anchor, true, right, 0.05};
+    EXPECT_LT(sight_residual(sight, placed, placed, s.camera, point)->norm(), 1e-12);
+    const SightJacobians J = sight_jacobians(sight, placed, placed, s.camera, point);
+    EXPECT_TRUE(J.landmark.leftCols<2>().isIdentity(0));
+    EXPECT_DOUBLE_EQ(J.landmark(0, 2), right ? -0.05 : 0);
+  }
 }
 
 TEST(SightFactor, RefusesWhatLiesBehindTheCamera) {
   const Scene s(6);
   FrameState turned = s.b;
   turned.R_OB = s.a.R_OB * so3::from_yaw(3.0);
-  const Sight sight{s.anchor, s.seen, s.of_a, s.of_b, false, 0.05};
-  EXPECT_FALSE(sight_residual(sight, s.a, turned, s.camera, 0.2));
+  const Sight sight{s.seen, false, false, 0.05};
+  EXPECT_FALSE(sight_residual(sight, {s.a, s.of_a, s.camera.t_d},
+                              {turned, s.of_b, s.camera.t_d}, s.camera, s.point));
 }
 
 /// A landmark as both frames of the scene see it.
 Landmark seen_by_both(const Scene& s, double inverse_depth, bool stereo) {
-  Landmark landmark{7, {s.anchor, s.seen}, 0};
-  CameraState still = s.camera;
-  still.t_d = 0;
+  Landmark landmark{7, {s.anchor, s.seen}, {}};
   Observation& anchor = landmark.seen[0];
   Observation& other = landmark.seen[1];
   anchor.right.reset();
   other.left.setZero();
   other.right = Vec2::Zero();
-  const Sight left{anchor, other, {}, {}, false, 0.05}, right{anchor, other, {}, {}, true, 0.05};
-  const Vec2 l = *sight_residual(left, s.a, s.b, still, inverse_depth);
-  const Vec2 r = *sight_residual(right, s.a, s.b, still, inverse_depth);
+  const Exposure a(s.a, {}, 0), b(s.b, {}, 0);
+  const LandmarkState point{anchor.left, inverse_depth};
+  const Vec2 l = *sight_residual({other, false, false, 0.05}, a, b, s.camera, point);
+  const Vec2 r = *sight_residual({other, false, true, 0.05}, a, b, s.camera, point);
   other.left = l;
   other.right = r;
   if (stereo) {
@@ -195,14 +206,14 @@ TEST(Triangulation, FindsThePointWhereItIs) {
 
 TEST(Triangulation, HasNoDepthFromOneRay) {
   const Scene s(1);
-  Landmark landmark{7, {s.anchor}, 0};
+  Landmark landmark{7, {s.anchor}, {}};
   landmark.seen[0].right.reset();
   EXPECT_FALSE(triangulate(landmark, {&s.a}, s.camera, 0.05));
 }
 
 TEST(Triangulation, TakesNoiseBeyondInfinityForTheBackdropAndMoreForAMismatch) {
   const Scene s(1);
-  Landmark landmark{7, {s.anchor}, 0};
+  Landmark landmark{7, {s.anchor}, {}};
   landmark.seen[0].right = landmark.seen[0].left + Vec2(0.5 / 423, 0);
   EXPECT_DOUBLE_EQ(*triangulate(landmark, {&s.a}, s.camera, 0.05), 1 / kBackdrop);
   landmark.seen[0].right = landmark.seen[0].left + Vec2(5.0 / 423, 0);

@@ -75,7 +75,7 @@ Window make_window(std::uint64_t seed, int frames, bool newest_too = true) {
       o.left = shaken(p_C.hnormalized());
       if (k % 2 == 0) o.right = shaken((p_C - kBaseline * Vec3::UnitX()).hnormalized());
       landmark.seen.push_back(o);
-      if (k == anchor) landmark.inverse_depth = (1 + 0.05 * random.normal()) / p_C.z();
+      if (k == anchor) landmark.state = {o.left, (1 + 0.05 * random.normal()) / p_C.z()};
     }
     window.landmarks.emplace(landmark.id, landmark);
   }
@@ -97,22 +97,25 @@ TEST(WindowSolver, StepsWhereADenseSolutionOfTheFullSystemDoes) {
     Window window = make_window(seed, 5);
     pin_down(window);
     const NormalEquations equations = linearise(window, noise_of(false));
-    const Eigen::Index n = equations.H.rows(), m = equations.W.cols(), v = equations.W.rows();
-    ASSERT_GT(m, 30);
+    const Eigen::Index n = equations.H.rows(), v = equations.W.rows();
+    const auto m = static_cast<Eigen::Index>(3 * equations.terms.size());
+    ASSERT_GT(m, 90);
     Eigen::MatrixXd full = Eigen::MatrixXd::Zero(n + m, n + m);
     Eigen::VectorXd g(n + m);
     full.topLeftCorner(n, n) = equations.H.selfadjointView<Eigen::Lower>();
-    full.block(0, n, v, m) = equations.W;
-    full.block(n, 0, m, v) = equations.W.transpose();
+    full.block(0, n, v, m) = equations.W.leftCols(m);
+    full.block(n, 0, m, v) = equations.W.leftCols(m).transpose();
     g.head(n) = equations.g;
-    for (Eigen::Index l = 0; l < m; ++l) {
-      full(n + l, n + l) = equations.terms[static_cast<std::size_t>(l)].h;
-      g[n + l] = equations.terms[static_cast<std::size_t>(l)].g;
+    Eigen::Index at = n;
+    for (const auto& term : equations.terms) {
+      full.block<3, 3>(at, at) = term.H;
+      g.segment<3>(at) = term.g;
+      at += 3;
     }
     const Eigen::VectorXd dense = -full.ldlt().solve(g);
     const WindowStep step = solve(equations, 0);
     EXPECT_LT((step.states - dense.head(n)).norm(), 1e-6 * dense.head(n).norm());
-    EXPECT_LT((step.inverse_depths - dense.tail(m)).norm(), 1e-6 * dense.tail(m).norm());
+    EXPECT_LT((step.landmarks - dense.tail(m)).norm(), 1e-6 * dense.tail(m).norm());
   }
 }
 
@@ -145,7 +148,7 @@ TEST(WindowSolver, ReducesTheCostToWhatTheNoiseLeaves) {
   Window window = make_window(5, 6);
   pin_down(window);
   int residuals = 0;
-  for (const auto& [id, landmark] : window.landmarks) residuals += 2 * (landmark.images() - 1);
+  for (const auto& [id, landmark] : window.landmarks) residuals += 2 * landmark.images() - 3;
   const SolveReport report = optimise(window, noise_of(false), 10, 1e-6);
   EXPECT_GT(report.cost_before, 3 * report.cost_after);
   // A chi square of as many degrees as there are residuals, roughly.
@@ -216,7 +219,7 @@ TEST(Marginalisation, CountsNoSightTwice) {
     const Landmark& landmark = window.landmarks.at(id);
     ASSERT_EQ(landmark.seen.size(), 1U);
     EXPECT_EQ(landmark.seen.front().frame, newest);
-    EXPECT_GT(landmark.inverse_depth, 0);
+    EXPECT_GT(landmark.state.inverse_depth, 0);
   }
 }
 

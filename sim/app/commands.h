@@ -48,6 +48,7 @@ int pattern(const PatternArguments& arguments);
 struct RenderArguments {
   std::string folder;  ///< a run folder
   std::string out;     ///< FILE.png: a picture; FILE.mp4: a film
+  std::string what;    ///< infrared; empty: the flight in its world
   std::string view;    ///< chase, top or both; empty: chase for a picture, both for a film
   std::optional<double> time_s;  ///< of a picture; default the middle of the flight
   std::optional<double> from_s;  ///< of a film; default the flight's start

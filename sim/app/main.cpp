@@ -92,6 +92,10 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
       ->add_option("--view", arguments.view,
                    "chase, top or both; default chase for a picture, both for a film")
       ->check(CLI::IsMember({"chase", "top", "both"}));
+  command
+      ->add_option("--what", arguments.what,
+                   "infrared: the left infrared image, with the features followed in it")
+      ->check(CLI::IsMember({"infrared"}));
   add_number(*command, "--time", arguments.time_s, kMoments,
              "moment of a picture, s; default the flight's middle");
   add_number(*command, "--from", arguments.from_s, kMoments,

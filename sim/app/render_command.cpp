@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "app/commands.h"
+#include "app/render_infrared.h"
 #include "config/config.h"
 #include "files/files.h"
 #include "pictures/film_writer.h"
@@ -117,6 +118,9 @@ int render(const RenderArguments& arguments) {
   if (ending != ".png" && ending != ".mp4") {
     throw ConfigError("--out " + arguments.out + ": expected FILE.png or FILE.mp4");
   }
+  if (!arguments.what.empty() && ending != ".png") {
+    throw ConfigError("--out " + arguments.out + ": --what draws pictures, expected FILE.png");
+  }
   if (!sim::is_run_folder(folder)) {
     throw ConfigError(folder.string() +
                       (std::filesystem::exists(folder) ? ": holds no run" : ": does not exist") +
@@ -131,7 +135,9 @@ int render(const RenderArguments& arguments) {
   const sim::Scenario scenario = sim::load_scenario(folder / "resolved.yaml", {}, {});
   const worlds::World world = scenario.build_world();
   const Pose X_WO = sim::start_pose(world);
-  if (ending == ".png") {
+  if (arguments.what == "infrared") {
+    draw_infrared(arguments, scenario, world, truth);
+  } else if (ending == ".png") {
     draw_still(arguments, world, X_WO, truth);
   } else {
     draw_film(arguments, world, X_WO, truth);

@@ -101,7 +101,8 @@ sim::BagOptions bag_options(const RunArguments& arguments, const sim::Scenario& 
   return {
       static_cast<sim::BagLayout>(named - sim::kBagLayoutNames.begin()),
       arguments.bag_compression == "lz4" ? sim::BagCompression::kLz4 : sim::BagCompression::kNone,
-      scenario.config.lidar.model.misses_in_bag};
+      scenario.config.lidar.model.misses_in_bag, scenario.config.draws_infrared(),
+      scenario.config.depth.model.baseline_m};
 }
 
 /// What a flight leaves: the run folder and, if asked for, a bag. A file that the disk refuses does

@@ -29,6 +29,10 @@ std::string camera_frame(const std::string& device) {
   return device.empty() ? "camera_depth_optical_frame" : device + "_optical_frame";
 }
 
+std::string infrared_frame(int number) {
+  return "camera_infra" + std::to_string(number) + "_optical_frame";
+}
+
 /// sensor_msgs/PointField's datatypes.
 enum class FieldType : std::uint8_t { kUint8 = 2, kUint32 = 6, kFloat32 = 7, kFloat64 = 8 };
 
@@ -310,9 +314,13 @@ void BagWriter::depth(const DepthImage& image) {
 }
 
 void BagWriter::camera_info(const DepthImage& image) {
-  const PinholeCamera& c = image.camera;
   Topic& topic = topic_of(image.device, kCameraInfos, "/camera_info", camera_info_type());
   begin_message(topic, image.stamp, camera_frame(image.device));
+  put_calibration(image.camera, 0);
+  write(topic);
+}
+
+void BagWriter::put_calibration(const PinholeCamera& c, double baseline_m) {
   message_.put(static_cast<std::uint32_t>(c.height));
   message_.put(static_cast<std::uint32_t>(c.width));
   message_.put("plumb_bob");
@@ -320,10 +328,43 @@ void BagWriter::camera_info(const DepthImage& image) {
   put_numbers(std::array<double, 5>{});
   put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0});
   put_numbers(std::array{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0});
-  put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
+  const double shift = baseline_m > 0 ? -c.fx * baseline_m : 0.0;
+  put_numbers(std::array{c.fx, 0.0, c.cx, shift, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
   for (int i = 0; i < 2; ++i) message_.put(std::uint32_t{0});  // binning: none
   for (int i = 0; i < 4; ++i) message_.put(std::uint32_t{0});  // region of interest: all
   message_.put(false);
+}
+
+void BagWriter::infrared(const StereoImage& image) {
+  if (image.time_ns < 0) return;  // its clock lags, and the run has just begun
+  eye(image, 1, image.left);
+  if (!image.right.empty()) eye(image, 2, image.right);
+}
+
+void BagWriter::eye(const StereoImage& image, int number, const std::vector<std::uint8_t>& grey) {
+  if (grey.size() !=
+      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
+    throw std::invalid_argument("an infrared image of " + std::to_string(image.width) + " x " +
+                                std::to_string(image.height) + " pixels has " +
+                                std::to_string(grey.size()) + " values");
+  }
+  const std::string name = "/camera/infra" + std::to_string(number);
+  const std::string frame = infrared_frame(number);
+  const StereoCamera& camera = image.camera;
+  Topic& info = topic_of("", (name + "/camera_info").c_str(), "", camera_info_type());
+  begin_message(info, image.time_ns, frame);
+  put_calibration({image.width, image.height, camera.f_px, camera.f_px, camera.cx, camera.cy},
+                  number == 2 ? camera.baseline_m : 0);
+  write(info);
+  Topic& topic = topic_of("", (name + "/image_rect_raw").c_str(), "", image_type());
+  begin_message(topic, image.time_ns, frame);
+  message_.put(static_cast<std::uint32_t>(image.height));
+  message_.put(static_cast<std::uint32_t>(image.width));
+  message_.put("mono8");
+  message_.put(std::uint8_t{0});  // is_bigendian
+  message_.put(static_cast<std::uint32_t>(image.width));
+  message_.put_length(grey.size());
+  message_.put_raw(grey.data(), grey.size());
   write(topic);
 }
 
@@ -336,6 +377,11 @@ void BagWriter::static_transforms(const VehicleConfig& vehicle) {
   for (const auto& [name, mount] : vehicle.mounts) {
     mounts.push_back({lidar_frame(name), mount.X_BL()});
     mounts.push_back({camera_frame(name), mount.X_BC()});
+  }
+  if (options_.infrared) {
+    const Pose X_CR{Mat3::Identity(), Vec3(options_.infrared_baseline_m, 0, 0)};
+    mounts.push_back({infrared_frame(1), vehicle.X_BC()});
+    mounts.push_back({infrared_frame(2), vehicle.X_BC() * X_CR});
   }
   message_.clear();
   message_.put_length(mounts.size());

@@ -12,6 +12,7 @@
 
 #include "bag/message_file.h"
 #include "messages/sensors.h"
+#include "messages/stereo_image.h"
 #include "messages/vehicle.h"
 
 namespace arex::sim {
@@ -32,6 +33,8 @@ struct BagOptions {
   BagLayout layout = BagLayout::kGeneric;
   BagCompression compression = BagCompression::kNone;
   bool lidar_misses = false;  ///< firings without a return are written, too
+  bool infrared = false;      ///< there will be infrared images: their frames go to /tf_static
+  double infrared_baseline_m = 0.05;  ///< of the right eye's frame
 };
 
 /// What the vehicle's sensors gave, as a recording on which others can run their own odometry: a
@@ -48,6 +51,12 @@ struct BagOptions {
 ///     /tf                  tf2_msgs/TFMessage       odom -> base_link as the vehicle estimates it
 ///     /tf_static           tf2_msgs/TFMessage       base_link -> livox_frame and -> camera,
 ///     latched
+///
+/// With infrared images, under the names that a D435i's driver has:
+///
+///     /camera/infra1/image_rect_raw  sensor_msgs/Image  camera_infra1_optical_frame, mono8, left
+///     /camera/infra2/image_rect_raw  the same of the right eye, where it was read
+///     /camera/infra1|2/camera_info   sensor_msgs/CameraInfo  of each; the right one's P[3] is -f B
 ///
 /// odom is O, base_link is B (the IMU), livox_frame is L, camera_depth_optical_frame is C. Points
 /// are in L, each at its own time. They stand in firing order, their times run backwards where the
@@ -84,6 +93,8 @@ class BagWriter {
   void estimate(Stamp stamp, const Pose& X_OB);
   /// @pre image.depth_m has width * height values
   void depth(const DepthImage& image);
+  /// @pre its images have width * height values
+  void infrared(const StereoImage& image);
   /// Completes FILE. Without it FILE.active remains.
   void close();
 
@@ -118,6 +129,9 @@ class BagWriter {
                      const Pose& X);
   [[nodiscard]] RosMessageType scan_type() const;
   void camera_info(const DepthImage& image);
+  void eye(const StereoImage& image, int number, const std::vector<std::uint8_t>& grey);
+  /// The rest of a sensor_msgs/CameraInfo behind its header. @param baseline_m to the left eye
+  void put_calibration(const PinholeCamera& camera, double baseline_m);
   void static_transforms(const VehicleConfig& vehicle);
 
   std::unique_ptr<MessageFile> file_;

@@ -4,6 +4,7 @@
 
 #include "run/scenario.h"
 #include "sensors/depth_device.h"
+#include "sensors/infrared_device.h"
 #include "sensors/lidar_device.h"
 #include "sensors/spinning_lidar.h"
 
@@ -64,6 +65,14 @@ std::unique_ptr<Device> make_mid360(const LidarConfig& config, const DeviceConte
 
 std::unique_ptr<Device> make_d430(const DepthConfig& config, const DeviceContext& context) {
   return std::make_unique<DepthDevice>(config.model, config.latency_s, context);
+}
+
+std::unique_ptr<Device> make_infrared(const ScenarioConfig& scenario,
+                                      const DeviceContext& context) {
+  if (!scenario.draws_infrared()) return nullptr;
+  return std::make_unique<InfraredDevice>(scenario.infrared,
+                                          scenario.depth.model.as_built(context.seed),
+                                          scenario.stack.vehicle.X_BC(), context);
 }
 
 }  // namespace arex::sim

@@ -21,5 +21,7 @@ const Registry<Device, DeviceMaking>& device_types();
 std::unique_ptr<Device> make_mid360(const LidarConfig& config, const DeviceContext& context);
 /// @param context its X_BS: C in B
 std::unique_ptr<Device> make_d430(const DepthConfig& config, const DeviceContext& context);
+/// The infrared pair of the first D430. @param context its X_BS: C in B; null if nobody reads it
+std::unique_ptr<Device> make_infrared(const ScenarioConfig& scenario, const DeviceContext& context);
 
 }  // namespace arex::sim

@@ -151,6 +151,16 @@ void Recorder::sample(Stamp stamp, const FlightSample& sample) {
                      csv_number(row.battery_fraction, 5)));
 }
 
+void Recorder::images(Stamp stamp, const StereoImage& images, double mean_grey) {
+  if (!infrared_) {
+    attempt([&] { infrared_.emplace(open("infrared.csv", csv_header("infrared.csv"))); });
+  }
+  if (!infrared_) return;
+  append(*infrared_,
+         fmt::format("{:.9f},{:.6f},{:.4f},{:.2f},{:d}\n", to_seconds(stamp), images.exposure_s,
+                     images.gain, mean_grey, images.right.empty() ? 0 : 1));
+}
+
 void Recorder::decision(const Decision& decision) {
   const auto name = [](const auto& names, auto value) {
     return std::string(names[static_cast<std::size_t>(value)]);
@@ -176,6 +186,7 @@ void Recorder::flush() {
   for (auto& [name, file] : others_) {
     if (file) files.push_back(&*file);
   }
+  if (infrared_) files.push_back(&*infrared_);
   for (GrowingFile* file : files) {
     if (file->is_open()) attempt([&] { file->flush(); });
   }

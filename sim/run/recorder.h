@@ -17,6 +17,7 @@
 #include "mapping/mapper.h"
 #include "math/pose.h"
 #include "messages/events.h"
+#include "messages/stereo_image.h"
 #include "scoring/flight_scorer.h"
 #include "semantics/semantic_map.h"
 
@@ -24,12 +25,12 @@ namespace arex::sim {
 
 /// Every file that a run, its report or a sweep writes into a run folder: what an older run in the
 /// same folder may have left. resolved.yaml stands last: it goes last, too.
-inline constexpr std::array<std::string_view, 22> kRunFiles{
+inline constexpr std::array<std::string_view, 23> kRunFiles{
     "summary.json", "truth.tum",    "estimate.tum",  "coverage.csv",       "events.csv",
     "timing.csv",   "cloud.pcd",    "map.bt",        "map2d.pgm",          "map2d.yaml",
     "report.html",  "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
-    "semantic.pcd", "objects.csv",  "semantic.png",  "host.json",          "output.txt",
-    "failure.json", "resolved.yaml"};
+    "infrared.csv", "semantic.pcd", "objects.csv",   "semantic.png",       "host.json",
+    "output.txt",   "failure.json", "resolved.yaml"};
 
 /// How many points the cloud had at a moment. Points are in the order of their first sight, so that
 /// the first `points` of cloud.pcd are the map of that moment.
@@ -52,6 +53,8 @@ class Recorder {
   void event(const Event& event);
   /// To truth.tum, estimate.tum and flight.csv; what further sources say to NAME.tum.
   void sample(Stamp stamp, const FlightSample& sample);
+  /// How an infrared frame was taken, to infrared.csv.
+  void images(Stamp stamp, const StereoImage& images, double mean_grey);
   /// Every candidate of a decision with its terms, to decisions.csv.
   void decision(const Decision& decision);
   /// Makes what was recorded so far readable by others.
@@ -83,7 +86,8 @@ class Recorder {
   std::filesystem::path directory_;
   GrowingFile truth_, estimate_, events_, flight_, decisions_;
   std::map<std::string, std::optional<GrowingFile>>
-      others_;  ///< NAME.tum of further odometry sources
+      others_;                           ///< NAME.tum of further odometry sources
+  std::optional<GrowingFile> infrared_;  ///< made when the first frame comes
   std::vector<std::string> failures_;
   std::atomic<bool> failed_ = false;
   mutable std::mutex mutex_;  ///< of failures_: the cloud is written in a job

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "autopilot/autopilot_config.h"
@@ -23,6 +25,7 @@
 #include "semantics/pcl_models.h"
 #include "semantics/semantic_config.h"
 #include "sensors/imu.h"
+#include "sensors/infrared_config.h"
 #include "sensors/mocap_device.h"
 #include "stack/stack_config.h"
 #include "worlds/recipes.h"
@@ -76,6 +79,7 @@ struct ScenarioConfig {
   ImuConfig imu;
   LidarConfig lidar;
   DepthConfig depth;
+  InfraredConfig infrared;
   MocapConfig mocap;
   std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
@@ -92,6 +96,7 @@ struct ScenarioConfig {
     f("imu", imu, "the autopilot's sensors");
     f("lidar", lidar, "MID-360");
     f("depth", depth, "D430");
+    f("infrared", infrared, "the D430's pair of infrared images");
     f("mocap", mocap, "motion capture, where odometry.source is that");
     f("devices", devices,
       "further ones by name: {type: mid360|spinning|d430, position_m: [..], rotation_rad: [..], "
@@ -104,9 +109,11 @@ struct ScenarioConfig {
     f("operator", operator_link, "the radio between operator and vehicle");
     f("semantics", semantics, "what the mapped cloud shows");
     f("scoring", scoring, "what the truth is compared with");
-    f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
-                !devices.contains("mocap"),
-            "devices with other names than imu, lidar, depth and mocap, which the first ones have");
+    f.check(
+        std::none_of(kFirstDevices.begin(), kFirstDevices.end(),
+                     [&](std::string_view name) { return devices.contains(std::string(name)); }),
+        "devices with other names than imu, lidar, depth, infrared and mocap, which the first "
+        "ones have");
     f.check(
         stack.mapping.enabled || std::none_of(commands.begin(), commands.end(), needs_a_planner),
         "mapping.enabled true, or commands without return and go_to, which are planned ways");
@@ -121,12 +128,18 @@ struct ScenarioConfig {
             "mapping.depth_rate_hz), further devices counted");
   }
 
+  static constexpr std::array<std::string_view, 5> kFirstDevices{"imu", "lidar", "depth",
+                                                                 "infrared", "mocap"};
   static bool needs_a_planner(const OperatorOrder& order) {
     return order.what == OperatorCommand::Kind::kReturn ||
            order.what == OperatorCommand::Kind::kGoTo;
   }
   /// Frames that the maps take, of all devices.
   [[nodiscard]] double mapped_frames_hz() const;
+  /// Whether anybody reads the infrared images.
+  [[nodiscard]] bool draws_infrared() const {
+    return infrared.enabled || stack.uses_odometry("visual_inertial");
+  }
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;
 };

@@ -109,6 +109,7 @@ void Simulation::add_devices() {
   }
   add("lidar", make_mid360(config_.lidar, context("", airframe.X_BL)));
   add("depth", make_d430(config_.depth, context("", airframe.X_BC)));
+  add("infrared", make_infrared(config_, context("", airframe.X_BC)));
   for (const auto& [name, section] : config_.devices) {
     const DeviceContext where = context(name, section.mount.X_BL());
     add(name, device_types().at(section.type, "devices").make(section.own, {config_, where}));
@@ -116,6 +117,13 @@ void Simulation::add_devices() {
 }
 
 Simulation::~Simulation() { jobs_.stop(); }
+
+void Simulation::record_to(Recorder& recorder) {
+  recorder_ = &recorder;
+  outlets_.on_images = [&recorder](Stamp stamp, const StereoImage& images, double mean_grey) {
+    recorder.images(stamp, images, mean_grey);
+  };
+}
 
 bool Simulation::tick() {
   stack_->begin(now_);

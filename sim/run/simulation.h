@@ -83,7 +83,7 @@ class Simulation {
   ~Simulation();
 
   /// Writes what happens from now on; `recorder` must outlive the flight.
-  void record_to(Recorder& recorder) { recorder_ = &recorder; }
+  void record_to(Recorder& recorder);
 
   /// Gives what the sensors deliver to a bag as well; it must outlive the flight.
   void record_to(BagWriter& bag) { outlets_.bag = &bag; }

@@ -32,6 +32,8 @@ std::vector<FigureInfo> run_figures() {
       {"device_hashes.lidar", "LiDAR's hash", "", kNeither, false, "of its scans", Kind::kText},
       {"device_hashes.depth", "depth camera's hash", "", kNeither, false,
        "of its frames; null: no frame was read", Kind::kText},
+      {"device_hashes.infrared", "infrared pair's hash", "", kNeither, false,
+       "of its images; null: none was read", Kind::kText},
       {"device_hashes.imu", "IMU's hash", "", kNeither, false,
        "of all that the autopilot's sensors delivered", Kind::kText},
       {"device_hashes.NAME", "hash of a further device", "", kNeither, false,
@@ -358,6 +360,11 @@ std::vector<ColumnInfo> map_and_decision_columns() {
       {"odometry_error.csv", "yaw_rad", "rad", "likewise"},
       {"cloud_growth.csv", "time_s", "s", "when it was counted"},
       {"cloud_growth.csv", "points", "", "of cloud.pcd that were there by then: its first ones"},
+      {"infrared.csv", "time_s", "s", "true middle of the exposure"},
+      {"infrared.csv", "exposure_s", "s", "how long the shutter was open"},
+      {"infrared.csv", "gain", "", "of the amplifier"},
+      {"infrared.csv", "mean_grey", "", "of the left image's middle, 0 to 255"},
+      {"infrared.csv", "right", "", "1: the right eye was read, too"},
   };
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "bag/bag_writer.h"
@@ -28,6 +29,8 @@ struct Outlets {
   FlightSoftware* software = nullptr;
   BagWriter* bag = nullptr;  ///< null: they are not recorded
   Fingerprint frames;        ///< of every scan and image, in order of delivery
+  /// Told of every infrared frame delivered, its true stamp and mean grey value; may be empty.
+  std::function<void(Stamp stamp, const StereoImage& images, double mean_grey)> on_images;
 };
 
 /// What a device is made from, beside its own parameters.

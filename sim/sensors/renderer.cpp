@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "sensors/renderer_culling.h"
 
@@ -18,6 +19,7 @@ constexpr int kLanes = 4;
 using Double4 = double __attribute__((vector_size(32)));
 using Long4 = std::int64_t __attribute__((vector_size(32)));
 using Float4 = float __attribute__((vector_size(16)));
+using Uint4 = std::uint32_t __attribute__((vector_size(16)));
 
 template <class Vector, class Scalar>
 Vector load(const Scalar* from) {
@@ -58,9 +60,8 @@ struct Box {
 
 /// A triangle as functions of a pixel's ray (x, y, 1): linear, n . ray.
 struct Footprint {
-  std::array<Vec3, 3> edges;    ///< none is negative where the ray passes inside
-  Vec3 inverse_depth;           ///< 1/z of its plane, 1/m
-  std::array<double, 3> roots;  ///< an edge is zero at x = roots[i] * (its value at x = 0)
+  std::array<Vec3, 3> edges;  ///< none is negative where the ray passes inside
+  Vec3 inverse_depth;         ///< 1/z of its plane, 1/m
 };
 
 /// The world's mesh in clusters, corners split by coordinate.
@@ -69,10 +70,12 @@ struct DepthMesh {
   std::vector<worlds::Chunk> bounds;                   ///< of each cluster, for culling
   std::vector<float> x, y, z;                          ///< corners in W, m
   std::vector<std::array<std::uint8_t, 3>> triangles;  ///< corners, counted within the cluster
+  std::vector<std::uint32_t> source;                   ///< of each triangle: its index in the mesh
 
   explicit DepthMesh(const worlds::Mesh& mesh) {
-    const ClusteredMesh clustered = cluster_mesh(mesh, kClusterTriangles);
+    ClusteredMesh clustered = cluster_mesh(mesh, kClusterTriangles);
     bounds = clustered.clusters;
+    source = std::move(clustered.source);
     constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> corner_of(clustered.vertices.size(), kUnused);
     for (std::size_t i = 0; i < bounds.size(); ++i) {
@@ -112,13 +115,22 @@ struct Renderer::Impl {
     for (int v = 0; v < camera.height; ++v) ray_y.push_back((v - camera.cy) / camera.fy);
   }
 
+  /// What a picture is made of: depths alone, or with the triangle of each pixel.
+  enum class Content : std::uint8_t { kDepth, kTriangles };
+
+  template <Content content>
+  void draw_all(const Pose& X_WC);
+  void crop(std::vector<float>& out) const;
+  template <Content content>
   void draw(const Cluster& cluster, const Pose& X_CW);
   void place(const Cluster& cluster, const Pose& X_CW);
   [[nodiscard]] Box box_of(std::size_t a, std::size_t b, std::size_t c) const;
   [[nodiscard]] bool footprint(const Vec3& a, const Vec3& b, const Vec3& c, bool closed,
                                Footprint& out) const;
-  void fill(const Footprint& footprint, const Box& box);
-  void fill_row(const Footprint& footprint, int v, int u_first, int u_last);
+  template <Content content>
+  void fill(const Footprint& footprint, const Box& box, std::uint32_t triangle);
+  template <Content content>
+  void fill_row(const Footprint& footprint, int v, int u_first, int u_last, std::uint32_t triangle);
 
   PinholeCamera camera;
   RendererOptions options;
@@ -126,6 +138,7 @@ struct Renderer::Impl {
   int stride;                        ///< of the picture under way, a multiple of the lanes, px
   std::vector<double> ray_x, ray_y;  ///< of each column and row
   std::vector<float> picture;        ///< 1/z so far
+  std::vector<std::uint32_t> seen;   ///< the triangle of each pixel of it, where that is asked for
   Corners corners;
   Statistics last_frame;
 };
@@ -176,48 +189,61 @@ bool Renderer::Impl::footprint(const Vec3& a, const Vec3& b, const Vec3& c, bool
   const double sign = offset > 0 ? 1 : -1;
   out.edges = {sign * a.cross(b), sign * b.cross(c), sign * c.cross(a)};
   out.inverse_depth = normal / offset;
-  for (std::size_t i = 0; i < 3; ++i) out.roots[i] = -1 / out.edges[i].x();
   return true;
 }
 
 /// Sets the pixels of a row that the triangle covers and nothing nearer does.
-void Renderer::Impl::fill_row(const Footprint& footprint, int v, int u_first, int u_last) {
+template <Renderer::Impl::Content content>
+void Renderer::Impl::fill_row(const Footprint& footprint, int v, int u_first, int u_last,
+                              std::uint32_t triangle) {
   const double y = ray_y[static_cast<std::size_t>(v)];
   const auto& [e0, e1, e2] = footprint.edges;
   const Vec3& depth = footprint.inverse_depth;
   const double row0 = e0.y() * y + e0.z(), row1 = e1.y() * y + e1.z(), row2 = e2.y() * y + e2.z();
   const double row_depth = depth.y() * y + depth.z();
   const double most = 1 / options.near_m;
-  float* row = &picture[static_cast<std::size_t>(v) * static_cast<std::size_t>(stride)];
+  const std::size_t first = static_cast<std::size_t>(v) * static_cast<std::size_t>(stride);
+  float* row = &picture[first];
+  std::uint32_t* row_seen = content == Content::kTriangles ? &seen[first] : nullptr;
   for (int u = u_first / kLanes * kLanes; u <= u_last; u += kLanes) {
     const auto x = load<Double4>(&ray_x[static_cast<std::size_t>(u)]);
     const Double4 q = depth.x() * x + row_depth;
-    const Long4 seen = (e0.x() * x + row0 >= 0) & (e1.x() * x + row1 >= 0) &
-                       (e2.x() * x + row2 >= 0) & (q <= most);
-    const auto drawn = __builtin_convertvector(seen ? q : Double4{}, Float4);
+    const Long4 covered = (e0.x() * x + row0 >= 0) & (e1.x() * x + row1 >= 0) &
+                          (e2.x() * x + row2 >= 0) & (q <= most);
+    const auto drawn = __builtin_convertvector(covered ? q : Double4{}, Float4);
     const auto before = load<Float4>(row + u);
     const Float4 after = drawn > before ? drawn : before;
     std::memcpy(row + u, &after, sizeof after);
+    if constexpr (content == Content::kTriangles) {
+      const auto seen_before = load<Uint4>(row_seen + u);
+      const Uint4 seen_after = drawn > before ? triangle - Uint4{} : seen_before;
+      std::memcpy(row_seen + u, &seen_after, sizeof seen_after);
+    }
   }
 }
 
-void Renderer::Impl::fill(const Footprint& footprint, const Box& box) {
+template <Renderer::Impl::Content content>
+void Renderer::Impl::fill(const Footprint& footprint, const Box& box, std::uint32_t triangle) {
   const bool wide = box.u_last - box.u_first >= kWide;
+  std::array<double, 3> roots{};  // an edge is zero at x = roots[i] * (its value at x = 0)
+  for (std::size_t i = 0; wide && i < 3; ++i) roots[i] = -1 / footprint.edges[i].x();
   for (int v = box.v_first; v <= box.v_last; ++v) {
     double first = box.u_first, last = box.u_last;
     for (std::size_t i = 0; wide && i < 3; ++i) {
       // A pixel of slack on both sides: fill_row decides.
       const Vec3& edge = footprint.edges[i];
       const double at_centre = edge.y() * ray_y[static_cast<std::size_t>(v)] + edge.z();
-      const double u = camera.cx + camera.fx * (at_centre * footprint.roots[i]);
+      const double u = camera.cx + camera.fx * (at_centre * roots[i]);
       if (edge.x() > 0) first = std::max(first, u - 1);
       if (edge.x() < 0) last = std::min(last, u + 1);
       if (edge.x() == 0 && at_centre < 0) last = first - 1;
     }
-    if (first <= last) fill_row(footprint, v, static_cast<int>(first), static_cast<int>(last));
+    if (first > last) continue;
+    fill_row<content>(footprint, v, static_cast<int>(first), static_cast<int>(last), triangle);
   }
 }
 
+template <Renderer::Impl::Content content>
 void Renderer::Impl::draw(const Cluster& cluster, const Pose& X_CW) {
   place(cluster, X_CW);
   Footprint footprint_of_triangle;
@@ -229,7 +255,40 @@ void Renderer::Impl::draw(const Cluster& cluster, const Pose& X_CW) {
                    footprint_of_triangle)) {
       continue;
     }
-    fill(footprint_of_triangle, box);
+    fill<content>(footprint_of_triangle, box, mesh.source[cluster.first_triangle + i]);
+  }
+}
+
+template <Renderer::Impl::Content content>
+void Renderer::Impl::draw_all(const Pose& X_WC) {
+  std::vector<std::uint32_t> visible(mesh.clusters.size());
+  std::iota(visible.begin(), visible.end(), 0U);
+  if (options.cull) {
+    visible = visible_chunks(mesh.bounds, ViewVolume(camera, X_WC, options.far_m));
+  }
+  const std::size_t pixels =
+      static_cast<std::size_t>(stride) * static_cast<std::size_t>(camera.height);
+  picture.assign(pixels, 0.0F);
+  if (content == Content::kTriangles) seen.assign(pixels, kNoTriangle);
+  last_frame = {visible.size(), 0};
+  const Pose X_CW = X_WC.inverse();
+  for (const std::uint32_t i : visible) {
+    draw<content>(mesh.clusters[i], X_CW);
+    last_frame.triangles += mesh.clusters[i].triangle_count;
+  }
+}
+
+/// Triangles that reach beyond far_m are drawn whole and cut here, so that the picture does not
+/// depend on how the world is cut into clusters.
+void Renderer::Impl::crop(std::vector<float>& out) const {
+  const auto width = static_cast<std::size_t>(camera.width);
+  const auto height = static_cast<std::size_t>(camera.height);
+  const auto least = static_cast<float>(1 / options.far_m);
+  out.resize(width * height);
+  for (std::size_t v = 0; v < height; ++v) {
+    const float* in = &picture[v * static_cast<std::size_t>(stride)];
+    std::transform(in, in + width, &out[v * width],
+                   [least](float q) { return q < least ? 0.0F : q; });
   }
 }
 
@@ -240,31 +299,28 @@ Renderer::Renderer(const worlds::World& world, const PinholeCamera& camera,
 Renderer::~Renderer() = default;
 
 void Renderer::render_inverse_depth(const Pose& X_WC, std::vector<float>& out) {
+  impl_->draw_all<Impl::Content::kDepth>(X_WC);
+  impl_->crop(out);
+}
+
+void Renderer::render_triangles(const Pose& X_WC, std::vector<float>& inverse_depth,
+                                std::vector<std::uint32_t>& triangles) {
   Impl& impl = *impl_;
-  const PinholeCamera& camera = impl.camera;
-  const auto width = static_cast<std::size_t>(camera.width);
-  const auto height = static_cast<std::size_t>(camera.height);
+  impl.draw_all<Impl::Content::kTriangles>(X_WC);
+  inverse_depth.swap(impl.picture);
+  triangles.swap(impl.seen);
+  const auto width = static_cast<std::size_t>(impl.camera.width);
   const auto stride = static_cast<std::size_t>(impl.stride);
-  std::vector<std::uint32_t> visible(impl.mesh.clusters.size());
-  std::iota(visible.begin(), visible.end(), 0U);
-  if (impl.options.cull) {
-    visible = visible_chunks(impl.mesh.bounds, ViewVolume(camera, X_WC, impl.options.far_m));
+  for (std::size_t v = 1; stride != width && v * stride < triangles.size(); ++v) {
+    std::copy_n(&inverse_depth[v * stride], width, &inverse_depth[v * width]);
+    std::copy_n(&triangles[v * stride], width, &triangles[v * width]);
   }
-  impl.picture.assign(stride * height, 0.0F);
-  impl.last_frame = {visible.size(), 0};
-  const Pose X_CW = X_WC.inverse();
-  for (const std::uint32_t i : visible) {
-    impl.draw(impl.mesh.clusters[i], X_CW);
-    impl.last_frame.triangles += impl.mesh.clusters[i].triangle_count;
-  }
-  // Triangles that reach beyond far_m are drawn whole and cut here, so that the picture does not
-  // depend on how the world is cut into clusters.
+  inverse_depth.resize(width * static_cast<std::size_t>(impl.camera.height));
+  triangles.resize(inverse_depth.size());
   const auto least = static_cast<float>(1 / impl.options.far_m);
-  out.resize(width * height);
-  for (std::size_t v = 0; v < height; ++v) {
-    const float* in = &impl.picture[v * stride];
-    std::transform(in, in + width, &out[v * width],
-                   [least](float q) { return q < least ? 0.0F : q; });
+  for (std::size_t i = 0; i < triangles.size(); ++i) {  // as crop() does
+    triangles[i] = inverse_depth[i] < least ? kNoTriangle : triangles[i];
+    inverse_depth[i] = inverse_depth[i] < least ? 0.0F : inverse_depth[i];
   }
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -42,6 +44,12 @@ class Renderer {
   /// there is nothing up to far_m. Linear across the image of a plane; exact to single precision.
   /// `out` is resized. Callable from any thread, one at a time.
   void render_inverse_depth(const Pose& X_WC, std::vector<float>& out);
+
+  static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
+  /// The same with the triangle that is seen: indices into Mesh::triangles, kNoTriangle where there
+  /// is nothing. Of two in the same place it is the one drawn first, which the pose decides.
+  void render_triangles(const Pose& X_WC, std::vector<float>& inverse_depth,
+                        std::vector<std::uint32_t>& triangles);
 
   /// What the last frame drew.
   [[nodiscard]] Statistics last_frame() const;

@@ -2,9 +2,12 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "bag/recording.h"
 #include "bag/sensor_decoder.h"
@@ -173,6 +176,93 @@ TEST(BagWriter, RefusesWhatABagCannotSay) {
   DepthImage image = test::depth_image(0);
   image.depth_m.pop_back();
   EXPECT_THROW(bag.depth(image), std::invalid_argument);
+}
+
+StereoImage infrared_image(int i) {
+  StereoImage image;
+  image.time_ns = i * 100'000'000 + 4'250'000;
+  image.width = 8;
+  image.height = 6;
+  for (int k = 0; k < 48; ++k) image.left.push_back(static_cast<std::uint8_t>(5 * k + i));
+  if (i % 2 == 0) image.right.assign(image.left.rbegin(), image.left.rend());
+  image.camera = {8, 6, 424.5, 3.5, 2.5, 0.0625, {}};
+  return image;
+}
+
+/// A value of a ROS 1 message.
+template <class T>
+T value_at(const RecordedMessage& message, std::size_t offset) {
+  T value;
+  std::memcpy(&value, message.bytes.data() + offset, sizeof value);
+  return value;
+}
+
+// sensor_msgs/CameraInfo: header with the frame's name, height, width, model, D, K, R, P.
+double projection_of(const RecordedMessage& message, std::size_t element) {
+  const auto frame = value_at<std::uint32_t>(message, 12);
+  const std::size_t size = 16 + frame;
+  const std::size_t p = size + 8 + 4 + std::string("plumb_bob").size() + 4 + 5 * 8 + 9 * 8 + 9 * 8;
+  return value_at<double>(message, p + 8 * element);
+}
+
+TEST(BagWriter, WritesInfraredImagesUnderTheNamesOfADriver) {
+  const TemporaryFolder folder;
+  BagOptions options;
+  options.infrared = true;
+  for (const std::string file : {"a.bag", "a.mcap"}) {
+    BagWriter bag(folder / file, VehicleConfig{}, options);
+    for (int i = 0; i < 4; ++i) {
+      bag.begin(i * 100'000'000 + 40'000'000);
+      bag.infrared(infrared_image(i));
+    }
+    bag.close();
+    Recording recording(folder / file);
+    std::map<std::string, std::uint64_t> messages;
+    for (const RecordedTopic& topic : recording.topics()) messages[topic.name] = topic.messages;
+    EXPECT_EQ(messages["/camera/infra1/image_rect_raw"], 4U) << file;
+    EXPECT_EQ(messages["/camera/infra1/camera_info"], 4U) << file;
+    EXPECT_EQ(messages["/camera/infra2/image_rect_raw"], 2U) << file;
+    EXPECT_EQ(messages["/camera/infra2/camera_info"], 2U) << file;
+  }
+  Recording recording(folder / "a.bag");
+  RecordedMessage message;
+  int seen = 0, transforms = 0;
+  while (recording.next(message)) {
+    const std::string& topic = recording.topics()[message.topic].name;
+    const std::string bytes(message.bytes);
+    if (topic == "/tf_static") {
+      transforms += bytes.find("camera_infra1_optical_frame") != std::string::npos;
+      transforms += bytes.find("camera_infra2_optical_frame") != std::string::npos;
+    }
+    if (topic.find("/camera/infra") != 0) continue;
+    const int eye = topic[13] - '0';
+    EXPECT_NE(bytes.find(eye == 1 ? "camera_infra1_optical_frame" : "camera_infra2_optical_frame"),
+              std::string::npos);
+    if (topic.ends_with("camera_info")) {
+      EXPECT_EQ(projection_of(message, 0), 424.5);
+      EXPECT_EQ(projection_of(message, 2), 3.5);
+      EXPECT_EQ(projection_of(message, 3), eye == 1 ? 0 : -424.5 * 0.0625);
+      EXPECT_EQ(projection_of(message, 6), 2.5);
+    } else {
+      EXPECT_NE(bytes.find("mono8"), std::string::npos);
+      const int index = static_cast<int>(message.time / 100'000'000);
+      const StereoImage image = infrared_image(index);
+      EXPECT_EQ(value_at<std::uint32_t>(message, 8), image.time_ns % kNanosecondsPerSecond);
+      const auto& grey = eye == 1 ? image.left : image.right;
+      EXPECT_EQ(bytes.substr(bytes.size() - 48), std::string(grey.begin(), grey.end()));
+    }
+    ++seen;
+  }
+  EXPECT_EQ(seen, 12);
+  EXPECT_EQ(transforms, 2);
+}
+
+TEST(BagWriter, RefusesAnInfraredImageOfTheWrongSize) {
+  const TemporaryFolder folder;
+  BagWriter bag(folder / "a.bag", VehicleConfig{});
+  StereoImage image = infrared_image(0);
+  image.left.pop_back();
+  EXPECT_THROW(bag.infrared(image), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "messages/sensors.h"
+#include "sensors/infrared_config.h"
+#include "sensors/infrared_shot.h"
+
+namespace arex::sim {
+
+/// Where the image of a point moves, px/s: of a standing point seen along the ray (x, y, 1) at
+/// inverse depth q (1/m).
+Vec2 image_velocity(const PinholeCamera& camera, const CameraTwist& twist, double x, double y,
+                    double q);
+
+/// Optics, shutter and pixels of one eye: from the light of a scene to grey values.
+///
+/// The scene is smeared along the way that each pixel's surface takes while the shutter is open,
+/// spread by the optics, dimmed towards the corners; electrons come as photons do and are read with
+/// noise. Gaussian for Poisson: 30 electrons make grey value 1.
+class InfraredImager {
+ public:
+  InfraredImager(const InfraredSensorConfig& config, const PinholeCamera& camera);
+
+  /// @param seed of this eye and frame
+  /// @param grey resized to width * height
+  void expose(const InfraredScene& scene, const InfraredExposure& exposure,
+              const CameraTwist& twist, std::uint64_t seed, std::vector<std::uint8_t>& grey);
+
+  /// The smeared and spread light that the pixels of the last frame received, lx.
+  [[nodiscard]] const std::vector<float>& received() const { return spread_; }
+
+ private:
+  void smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist);
+  void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist);
+  [[nodiscard]] float mean_along(const std::vector<float>& in, int u, int v, float du,
+                                 float dv) const;
+  void spread();
+  void read(const InfraredExposure& exposure, std::uint64_t seed, std::vector<std::uint8_t>& grey);
+
+  InfraredSensorConfig config_;
+  PinholeCamera camera_;
+  std::vector<float> vignette_;       ///< share of the light that comes through, of each pixel
+  std::vector<float> column_x_;       ///< (u - cx) / fx
+  std::vector<float> way_u_, way_v_;  ///< of a row's pixels, px
+  std::vector<float> smeared_, rows_, spread_;
+};
+
+}  // namespace arex::sim

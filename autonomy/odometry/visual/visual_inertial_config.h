@@ -174,6 +174,7 @@ struct VisualInertialConfig {
   SlidingWindowConfig window;
   VisualHealthConfig health;
   double latency_s = 0.030;
+  bool report_features = false;
 
   void fields(auto& f) {
     f("imu", imu, "noise of the IMU");
@@ -184,6 +185,8 @@ struct VisualInertialConfig {
     f("health", health, "when it is lost");
     f("latency_s", latency_s,
       "modelled compute time of a pair of images; a further source's own latency_s goes before it");
+    f("report_features", report_features,
+      "tells onlookers what it follows in each image: vio_features.csv");
     f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
   }
 };

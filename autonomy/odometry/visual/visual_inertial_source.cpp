@@ -8,8 +8,10 @@ std::optional<OdometrySource::Job> VisualInertialSource::add_images(const Stereo
   return [this, job = odometry_.prepare(images)]() -> Delivery {
     VisualUpdate update = odometry_.correct(job);
     std::vector<FeatureSight> features;
-    for (const ImageFeature& f : odometry_.tracker().features()) {
-      features.push_back({update.stamp, f.id, f.left_px, f.age});
+    if (report_features_) {
+      for (const ImageFeature& f : odometry_.tracker().features()) {
+        features.push_back({update.stamp, f.id, f.left_px, f.age});
+      }
     }
     return [this, update = std::move(update), features = std::move(features)] {
       apply(update, features);

@@ -13,7 +13,7 @@ namespace arex {
 class VisualInertialSource : public OdometrySource {
  public:
   VisualInertialSource(const VisualInertialConfig& config, const Pose& X_BC, std::uint64_t seed)
-      : odometry_(config, X_BC, seed) {}
+      : odometry_(config, X_BC, seed), report_features_(config.report_features) {}
 
   void add_imu(const ImuSample& imu) override { odometry_.add_imu(imu); }
   std::optional<Job> add_images(const StereoImagePtr& images) override;
@@ -29,6 +29,7 @@ class VisualInertialSource : public OdometrySource {
   void apply(const VisualUpdate& update, std::vector<FeatureSight> features);
 
   VisualInertialOdometry odometry_;
+  bool report_features_;
   std::vector<std::string> faults_;
   std::vector<FeatureSight> features_;  ///< of the newest exposure
   VisualTally tally_;

@@ -45,12 +45,12 @@ struct SyntheticRun {
   std::vector<Odometry> fast;          ///< at every IMU sample
   std::vector<VisualUpdate> updates;
   std::vector<std::string> faults;
-  double ate_m = 0;                    ///< RMS over the updates, aligned at the start
+  double ate_m = 0;                    ///< RMS over the fast output
   double worst_m = 0;
   double end_m = 0;
   double worst_yaw_rad = 0;
-  double nees_position = 0;            ///< mean over the updates in flight, 3 expected
-  double largest_step_m = 0;           ///< of the fast output, beyond its velocity
+  double nees_position = 0;            ///< mean of e' P^-1 e in flight, 3 expected
+  double largest_step_m = 0;           ///< of the fast output, by an update
 };
 
 /// What becomes of a frame before the odometry gets it.

@@ -16,9 +16,13 @@ enum class OdometryNeed {
   kScan,            ///< no returns
   kReference,       ///< returns, but too few surfaces to register against
   kMocap,           ///< nothing from the tracking system
+  kImages,          ///< no image, or none with anything in it
+  kFeatures,        ///< images, but too little in them to follow
 };
-inline constexpr std::array<std::string_view, 9> kOdometryNeedNames{
-    "nothing",         "no_imu",  "gyro_bias",           "gyro_noise", "accel_noise",
-    "accel_magnitude", "no_scan", "nothing_to_register", "no_mocap"};
+inline constexpr std::array<std::string_view, 11> kOdometryNeedNames{
+    "nothing",   "no_imu",           "gyro_bias",
+    "gyro_noise", "accel_noise",     "accel_magnitude",
+    "no_scan",   "nothing_to_register", "no_mocap",
+    "no_images", "nothing_to_follow"};
 
 }  // namespace arex

@@ -9,6 +9,8 @@
 #include "messages/odometry_need.h"
 #include "messages/registered_scan.h"
 #include "messages/sensors.h"
+#include "messages/stereo_image.h"
+#include "messages/visual_tracks.h"
 
 namespace arex {
 
@@ -28,6 +30,7 @@ class OdometrySource {
   /// @pre the stamp is later than those before.
   virtual void add_imu(const ImuSample& imu) = 0;
   virtual std::optional<Job> add_scan(const LidarScanPtr& /*scan*/) { return std::nullopt; }
+  virtual std::optional<Job> add_images(const StereoImagePtr& /*images*/) { return std::nullopt; }
   virtual void add_mocap(const MocapSample& /*mocap*/) {}
 
   /// The newest estimate, 200 Hz; kInitialising before the first.
@@ -38,6 +41,12 @@ class OdometrySource {
   virtual std::vector<std::string> take_faults() { return {}; }
   /// Scans placed since the last call, for the maps.
   virtual std::vector<RegisteredScan> take_scans() { return {}; }
+  /// Whether it does that; if not, they are placed by its poses.
+  [[nodiscard]] virtual bool places_scans() const { return true; }
+  /// What a visual odometry has done so far; nothing of any other.
+  [[nodiscard]] virtual std::optional<VisualTally> visual_tally() const { return std::nullopt; }
+  /// Features of the newest exposure, if that has come since the last call.
+  virtual std::vector<FeatureSight> take_features() { return {}; }
 };
 
 }  // namespace arex

@@ -19,6 +19,7 @@
 #include "messages/operator.h"
 #include "messages/sensors.h"
 #include "messages/stereo_image.h"
+#include "messages/visual_tracks.h"
 #include "mission/mission.h"
 #include "planning/local_planner.h"
 
@@ -28,6 +29,7 @@ namespace arex {
 struct NamedOdometry {
   std::string_view name;
   const Odometry* odometry = nullptr;
+  std::optional<VisualTally> tally{};  ///< of a visual one
 };
 
 /// What onlookers may see of the flight software between two ticks. Refers to it: to be asked for
@@ -46,6 +48,7 @@ struct FlightView {
   double known_volume_m3;                        ///< when map_2d was taken
   const PlanCounts& plans;
   OdometryNeed need;  ///< what keeps the odometry from being ok
+  std::optional<VisualTally> tally{};  ///< of a visual odometry that was to fly from the start
 };
 
 /// The flight software as the vehicle around it knows it: fed with what the sensors deliver, in the
@@ -75,6 +78,8 @@ class FlightSoftware {
   /// What happened, and what the explorer decided, since the last call.
   virtual std::vector<Event> take_events() = 0;
   virtual std::vector<Decision> take_decisions() = 0;
+  /// What the newest exposure showed to a visual odometry, if one has come since the last call.
+  virtual std::vector<FeatureSight> take_features() { return {}; }
 
   [[nodiscard]] virtual FlightView view() const = 0;
 

@@ -11,6 +11,7 @@
 #include "exploration/revenue_explorer.h"
 #include "odometry/lidar_inertial_source.h"
 #include "odometry/mocap_source.h"
+#include "odometry/visual/visual_inertial_source.h"
 #include "stack/stack_config.h"
 
 namespace arex {
@@ -25,6 +26,14 @@ void register_shipped(Modules& to) {
                      const StackConfig& config = context.config;
                      return std::make_unique<LidarInertialSource>(
                          read_over(config.odometry.lidar_inertial, section), config.vehicle);
+                   }});
+  to.odometry.add({std::string(kVisualInertial), "sliding window on the infrared pair (VINS family)",
+                   given_parameters<VisualInertialConfig>,
+                   [](const ConfigNode& section, const ModuleContext& context) {
+                     const StackConfig& config = context.config;
+                     return std::make_unique<VisualInertialSource>(
+                         read_over(config.odometry.visual_inertial, section),
+                         config.vehicle.X_BC(), context.seed);
                    }});
   to.odometry.add<NoParameters>("mocap", "the true pose: the oracle, for ablations",
                                 [](const NoParameters&, const ModuleContext& context) {

@@ -1,5 +1,6 @@
 #include "stack/stack.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "stack/modules.h"
@@ -39,6 +40,8 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       seed_(seed),
       jobs_(jobs),
       sources_(make_sources()),
+      may_fly_(std::max<std::size_t>(1, config_.odometry.failover.size())),
+      switch_(config_.odometry.handover, may_fly_),
       lidar_watch_(config_.odometry.watch),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
@@ -58,22 +61,30 @@ std::vector<Stack::Source> Stack::make_sources() {
   const std::string& flying = config_.odometry.source;
   std::vector<Source> sources;
   sources.push_back(make_source(flying, "odometry"));
-  for (const auto& [name, section] : config_.odometries) {
-    if (name != flying) sources.push_back(make_source(name, "odometry_" + name));
-  }
+  const auto add = [&](const std::string& name) {
+    const bool there = std::any_of(sources.begin(), sources.end(),
+                                   [&](const Source& source) { return source.name == name; });
+    if (!there) sources.push_back(make_source(name, "odometry_" + name));
+  };
+  for (const std::string& name : config_.odometry.failover) add(name);
+  for (const auto& [name, section] : config_.odometries) add(name);
   return sources;
 }
 
 Stack::Source Stack::make_source(const std::string& name, const std::string& lane) {
+  const auto latency_of = [&](const std::string& type) {
+    return type == kVisualInertial ? config_.odometry.visual_inertial.latency_s
+                                   : config_.odometry.latency_s;
+  };
   const auto further = config_.odometries.find(name);
   if (further == config_.odometries.end()) {
     return {name, make(modules().odometry, name, config_, seed_), jobs_.add_lane(lane),
-            from_seconds(config_.odometry.latency_s)};
+            from_seconds(latency_of(name))};
   }
   const OdometrySection& section = further->second;
   return {name, modules().odometry.at(section.type, name).make(section.own, {config_, seed_}),
           jobs_.add_lane(lane),
-          from_seconds(section.latency_s.value_or(config_.odometry.latency_s))};
+          from_seconds(section.latency_s.value_or(latency_of(section.type)))};
 }
 
 void Stack::add_imu(const ImuSample& imu) {
@@ -81,6 +92,7 @@ void Stack::add_imu(const ImuSample& imu) {
     source.odometry->add_imu(imu);
     collect(source);
   }
+  choose_source();
 }
 
 void Stack::add_autopilot(const AutopilotStatus& status) { autopilot_ = status; }
@@ -102,30 +114,49 @@ void Stack::add_scan(const LidarScanPtr& scan) {
     return;
   }
   lidar_watch_.add_scan(now_, *scan);
-  for (Source& source : sources_) {
-    if (auto job = source.odometry->add_scan(scan)) {
-      jobs_.start(source.lane, now_, source.latency,
-                  [this, &source, job = *std::move(job)]() -> JobQueue::Delivery {
-                    return [this, &source, deliver = job()] {
-                      deliver();
-                      collect(source);
-                    };
-                  });
-    }
-    collect(source);
+  for (Source& source : sources_) start(source, source.odometry->add_scan(scan));
+  if (!flying().odometry->places_scans()) perception_.add_scan(now_, *scan);
+}
+
+void Stack::add_images(const StereoImagePtr& images) {
+  for (Source& source : sources_) start(source, source.odometry->add_images(images));
+}
+
+void Stack::start(Source& source, std::optional<OdometrySource::Job> job) {
+  if (job) {
+    jobs_.start(source.lane, now_, source.latency,
+                [this, &source, job = *std::move(job)]() -> JobQueue::Delivery {
+                  return [this, &source, deliver = job()] {
+                    deliver();
+                    collect(source);
+                  };
+                });
   }
+  collect(source);
+}
+
+void Stack::choose_source() {
+  if (may_fly_ == 1) return;
+  std::vector<const Odometry*> newest;
+  for (std::size_t i = 0; i < may_fly_; ++i) newest.push_back(&sources_[i].odometry->odometry());
+  const std::string before = flying().name;
+  if (!switch_.update(newest)) return;
+  report(EventKind::kRecovery, "odometry " + flying().name + " takes over from " + before);
+  set_odometry(switch_.in_common_frame(flying().odometry->odometry()));
 }
 
 void Stack::collect(Source& source) {
   const std::vector<RegisteredScan> scans = source.odometry->take_scans();
-  if (&source != &sources_.front()) return;
+  const bool visual = source.odometry->visual_tally().has_value();
+  if (&source != &flying() && !visual) return;
   for (const std::string& fault : source.odometry->take_faults()) {
     report(EventKind::kSensorFault, fault);
   }
+  if (&source != &flying()) return;
   for (const RegisteredScan& scan : scans) {
     if (scan.matched_share) lidar_watch_.add_matched_share(*scan.matched_share);
   }
-  set_odometry(source.odometry->odometry());
+  set_odometry(switch_.in_common_frame(source.odometry->odometry()));
   for (const RegisteredScan& scan : scans) {
     if (scan.jumped) start_again(scan.stamp);
     perception_.add_scan(now_, scan);
@@ -175,7 +206,7 @@ Odometry Stack::checked_odometry() const {
 }
 
 OdometryNeed Stack::odometry_need() const {
-  const OdometryNeed need = sources_.front().odometry->need();
+  const OdometryNeed need = flying().odometry->need();
   // An estimate comes with the IMU's samples.
   const bool silent = now_ - odometry_.stamp > kOdometryStale && need != OdometryNeed::kMocap;
   return silent ? OdometryNeed::kImu : need;
@@ -324,9 +355,11 @@ FlightView Stack::view() const {
                   perception_.map_2d(),
                   perception_.known_volume_m3(),
                   navigator_.counts(),
-                  odometry_need()};
+                  odometry_need(),
+                  sources_.front().odometry->visual_tally()};
   for (std::size_t i = 1; i < sources_.size(); ++i) {
-    view.others.push_back({sources_[i].name, &sources_[i].odometry->odometry()});
+    const OdometrySource& source = *sources_[i].odometry;
+    view.others.push_back({sources_[i].name, &source.odometry(), source.visual_tally()});
   }
   return view;
 }
@@ -337,6 +370,15 @@ void Stack::read_cloud(Stamp due, CloudReader reader) {
 }
 
 std::vector<Event> Stack::take_events() { return std::exchange(events_, {}); }
+
+std::vector<FeatureSight> Stack::take_features() {
+  std::vector<FeatureSight> features;
+  for (Source& source : sources_) {
+    features = source.odometry->take_features();
+    if (!features.empty()) break;
+  }
+  return features;
+}
 
 std::vector<Decision> Stack::take_decisions() { return std::exchange(decisions_, {}); }
 

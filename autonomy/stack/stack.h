@@ -15,6 +15,7 @@
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 #include "stack/navigator.h"
+#include "stack/odometry_switch.h"
 #include "stack/perception.h"
 #include "stack/stack_config.h"
 
@@ -29,7 +30,8 @@ namespace arex {
 ///                                     tracker -> attitude and thrust
 ///
 /// The first of its odometry sources flies the vehicle; others run beside, each in a lane of its
-/// own. Heavy work goes through the job queue.
+/// own, and those that `odometry.failover` names take over when it is lost. Heavy work goes through
+/// the job queue.
 class Stack : public FlightSoftware {
  public:
   /// @param seed of the planner's and the explorer's random streams
@@ -44,10 +46,12 @@ class Stack : public FlightSoftware {
   void add_mocap(const MocapSample& mocap) override;
   void add_scan(const LidarScanPtr& scan) override;
   void add_depth(const DepthImagePtr& depth) override;
+  void add_images(const StereoImagePtr& images) override;
   [[nodiscard]] bool accepts_depth(const std::string& device, Stamp stamp) override;
   std::optional<AttitudeCommand> tick() override;
   std::vector<Event> take_events() override;
   std::vector<Decision> take_decisions() override;
+  std::vector<FeatureSight> take_features() override;
   [[nodiscard]] FlightView view() const override;
   void read_cloud(Stamp due, CloudReader reader) override;
   [[nodiscard]] const PointCloudMap& cloud() const override { return perception_.cloud(); }
@@ -63,8 +67,14 @@ class Stack : public FlightSoftware {
 
   std::vector<Source> make_sources();
   Source make_source(const std::string& name, const std::string& lane);
+  /// Has the source's job done in its lane.
+  void start(Source& source, std::optional<OdometrySource::Job> job);
   /// Takes what a source has found out since it was last asked.
   void collect(Source& source);
+  [[nodiscard]] Source& flying() { return sources_[switch_.flying()]; }
+  [[nodiscard]] const Source& flying() const { return sources_[switch_.flying()]; }
+  /// Hands over to another source when the flying one has failed, or back.
+  void choose_source();
   void report(EventKind kind, const std::string& detail);
   void set_odometry(const Odometry& odometry);
   [[nodiscard]] bool jumps_to(const Odometry& odometry) const;
@@ -87,7 +97,9 @@ class Stack : public FlightSoftware {
   std::vector<Event> events_;
   std::vector<Decision> decisions_;
 
-  std::vector<Source> sources_;  ///< the first flies
+  std::vector<Source> sources_;  ///< the first flies; those that may take over come next
+  std::size_t may_fly_ = 1;      ///< so many of them, from the first on
+  OdometrySwitch switch_;
   LidarWatch lidar_watch_;
   Odometry odometry_;
   AutopilotStatus autopilot_;

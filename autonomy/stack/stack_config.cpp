@@ -95,6 +95,10 @@ void check_modules(const StackConfig& config, const ConfigNode& scenario) {
     static_cast<void>(
         all.odometry.at(config.odometry.source, location_of(scenario, "odometry", "source")));
   }
+  for (const std::string& name : config.odometry.failover) {
+    if (config.odometries.contains(name)) continue;
+    static_cast<void>(all.odometry.at(name, location_of(scenario, "odometry", "failover")));
+  }
   static_cast<void>(all.explorers.at(config.exploration.strategy,
                                      location_of(scenario, "exploration", "strategy")));
   static_cast<void>(
@@ -134,7 +138,9 @@ void set_mapped_box(const StackConfig& asked, GlobalMapConfig& box) {
 }
 
 bool StackConfig::uses_odometry(std::string_view type) const {
-  return odometry.source == type ||
+  const bool takes_over = std::find(odometry.failover.begin(), odometry.failover.end(), type) !=
+                          odometry.failover.end();
+  return odometry.source == type || takes_over ||
          std::any_of(odometries.begin(), odometries.end(),
                      [&](const auto& further) { return further.second.type == type; });
 }

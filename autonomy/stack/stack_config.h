@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,12 +19,17 @@
 #include "messages/vehicle.h"
 #include "mission/mission.h"
 #include "odometry/lidar_inertial_config.h"
+#include "odometry/visual/visual_inertial_config.h"
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
+#include "stack/odometry_switch.h"
 
 namespace arex {
+
+/// The type of the odometry on the infrared pair.
+inline constexpr std::string_view kVisualInertial = "visual_inertial";
 
 /// A further odometry source: its type, and the parameters of that type.
 struct OdometrySection {
@@ -48,6 +54,9 @@ struct OdometryConfig {
   std::string source = "lidar_inertial";
   double latency_s = 0.020;  ///< modelled compute time of a scan update
   LidarInertialConfig lidar_inertial;
+  VisualInertialConfig visual_inertial;
+  std::vector<std::string> failover;
+  FailoverConfig handover;
   LidarWatchConfig watch;
   /// A step of the pose beyond this has moved the local map out of its place: three of its cells,
   /// what the inflation leaves beside the vehicle.
@@ -55,14 +64,23 @@ struct OdometryConfig {
 
   void fields(auto& f) {
     f("source", source,
-      "where pose and velocity come from: a type (lidar_inertial|mocap), or a name under "
-      "odometries; mocap is the oracle, for ablation");
+      "where pose and velocity come from: a type (lidar_inertial|visual_inertial|mocap), or a name "
+      "under odometries; mocap is the oracle, for ablation");
     f("latency_s", latency_s, "modelled compute time of a scan update");
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
+    f("visual_inertial", visual_inertial, "visual-inertial odometry on the infrared pair");
+    f("failover", failover,
+      "sources that may fly, the first while it can: [lidar_inertial, visual_inertial]; each a type "
+      "or a name under odometries. Empty: source alone");
+    f("handover", handover, "from one of these to another");
     f("jump_m", jump_m, "a step of the pose beyond this makes the local grid and the plan anew");
     f("watch", watch, "when the LiDAR is called faulty");
     f.check(latency_s >= 0 && latency_s <= 60, "0 <= latency_s <= 60");
     f.check(jump_m > 0, "jump_m > 0");
+    f.check(failover.empty() || failover.front() == source,
+            "failover empty, or with source as its first");
+    f.check(std::set<std::string>(failover.begin(), failover.end()).size() == failover.size(),
+            "failover without a name twice");
   }
 };
 

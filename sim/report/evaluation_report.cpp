@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
 
+#include "config/config.h"
 #include "report/page.h"
 #include "report/svg.h"
 #include "run/markup.h"
@@ -98,7 +101,8 @@ class TopView {
   Eigen::Index up_;
 };
 
-std::string tracks_html(const Comparison& comparison) {
+/// @param id of the picture within its page
+std::string tracks_figure_html(const Comparison& comparison, const std::string& id) {
   const TopView view(!comparison.reference.has_time());
   Eigen::AlignedBox2d box;
   std::vector<std::string> names;
@@ -113,9 +117,9 @@ std::string tracks_html(const Comparison& comparison) {
   // The scale bar stands below.
   box = {box.min() - Vec2(2 * unit, 5 * unit), box.max() + Vec2::Constant(2 * unit)};
   std::string svg = fmt::format(
-      "<svg id=\"path-map\" class=\"map\" role=\"img\" aria-label=\"Tracks seen from above\" "
+      "<svg id=\"{}\" class=\"map\" role=\"img\" aria-label=\"Tracks seen from above\" "
       "viewBox=\"{:.3f} {:.3f} {:.3f} {:.3f}\">\n",
-      box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y());
+      id, box.min().x(), -box.max().y(), box.sizes().x(), box.sizes().y());
   // The reference where any estimate knows it.
   const auto longest = std::max_element(
       comparison.estimates.begin(), comparison.estimates.end(), [](const auto& a, const auto& b) {
@@ -128,11 +132,28 @@ std::string tracks_html(const Comparison& comparison) {
         view.polyline(comparison.estimates[i].evaluation.pairs, &PosePair::X_OB, svg_line_class(i));
   }
   svg += svg_ends(view(pairs.front().X_WB), view(pairs.back().X_WB), unit);
-  return "<section>\n<h2>Seen from above</h2>\n<figure>\n" + svg + svg_scale_bar(box, unit) +
+  return "<figure>\n" + svg + svg_scale_bar(box, unit) +
          "</svg>\n<figcaption class=\"map-key\">" + key_html(names) +
          "<span><i style=\"border-color:var(--truth);border-top-style:dashed\"></i>reference</span>"
          "<span><i class=\"ring\"></i>start</span><span style=\"color:var(--bad)\">× end</span>"
-         "</figcaption>\n</figure>\n</section>\n";
+         "</figcaption>\n</figure>\n";
+}
+
+std::string tracks_html(const Comparison& comparison) {
+  return "<section>\n<h2>Seen from above</h2>\n" + tracks_figure_html(comparison, "path-map") +
+         "</section>\n";
+}
+
+/// The same tracks up to where the reference has come that far.
+Comparison begin_of(const Comparison& comparison, double distance_m) {
+  Comparison begin = comparison;
+  for (ComparedEstimate& estimate : begin.estimates) {
+    Evaluation& e = estimate.evaluation;
+    std::size_t count = 0;
+    while (count < e.distance_m.size() && e.distance_m[count] <= distance_m) ++count;
+    e.pairs.resize(std::max<std::size_t>(1, count));
+  }
+  return begin;
 }
 
 std::string charts_html(const Comparison& comparison) {
@@ -175,6 +196,37 @@ std::string evaluation_report_html(const Comparison& comparison) {
   html += "<section>\n<h2>In full</h2>\n<details><summary>evaluation.json</summary><pre>" +
           escape_markup(comparison_json(comparison).dump(2)) + "</pre></details>\n</section>\n";
   return report_page("AREX: trajectory error", html);
+}
+
+std::string odometries_html(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.ends_with(".tum") && name != "truth.tum" && name != "estimate.tum") {
+      files.push_back(entry.path());
+    }
+  }
+  if (files.empty()) return {};
+  std::sort(files.begin(), files.end());
+  files.insert(files.begin(), folder / "estimate.tum");
+  try {
+    std::vector<Trajectory> estimates;
+    for (const auto& file : files) estimates.push_back(read_trajectory(file));
+    EvaluationOptions options;
+    options.alignment = Alignment::kOrigin;
+    const Comparison comparison =
+        compare(read_trajectory(folder / "truth.tum"), std::move(estimates), options);
+    constexpr double kBegin = 10;  // m
+    return "<section id=\"odometries\">\n<h2>Odometries</h2>\n<p>(a) Begun together: the first "
+           "10 m.</p>\n" +
+           tracks_figure_html(begin_of(comparison, kBegin), "odometries-begin") +
+           "<p>(b) The paths, aligned at the start.</p>\n" +
+           tracks_figure_html(comparison, "odometries-paths") +
+           "<p>(c) The errors.</p>\n</section>\n" + charts_html(comparison);
+  } catch (const ConfigError&) {  // of a run cut short: nothing to compare yet
+    return {};
+  }
 }
 
 }  // namespace arex::sim

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "files/files.h"
+#include "report/evaluation_report.h"
 #include "report/map_picture.h"
 #include "report/page.h"
 #include "report/payload.h"
@@ -293,6 +294,7 @@ std::string run_report_html(const RunRecord& run) {
       "this page does not.</p></noscript>\n";
   html += "<section id=\"replay\"></section>\n";
   html += map_html(run);
+  html += odometries_html(run.folder);
   html += semantics_html(run);
   html += "<section id=\"against-time\"></section>\n";
   html +=

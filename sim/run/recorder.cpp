@@ -161,6 +161,20 @@ void Recorder::images(Stamp stamp, const StereoImage& images, double mean_grey) 
                      images.gain, mean_grey, images.right.empty() ? 0 : 1));
 }
 
+void Recorder::features(const std::vector<FeatureSight>& features) {
+  if (features.empty()) return;
+  if (!features_) {
+    attempt([&] { features_.emplace(open("vio_features.csv", csv_header("vio_features.csv"))); });
+  }
+  if (!features_) return;
+  std::string rows;
+  for (const FeatureSight& f : features) {
+    rows += fmt::format("{:.9f},{},{:.2f},{:.2f},{}\n", to_seconds(f.stamp), f.id, f.left_px.x(),
+                        f.left_px.y(), f.age);
+  }
+  append(*features_, rows);
+}
+
 void Recorder::decision(const Decision& decision) {
   const auto name = [](const auto& names, auto value) {
     return std::string(names[static_cast<std::size_t>(value)]);
@@ -187,6 +201,7 @@ void Recorder::flush() {
     if (file) files.push_back(&*file);
   }
   if (infrared_) files.push_back(&*infrared_);
+  if (features_) files.push_back(&*features_);
   for (GrowingFile* file : files) {
     if (file->is_open()) attempt([&] { file->flush(); });
   }

@@ -18,6 +18,7 @@
 #include "math/pose.h"
 #include "messages/events.h"
 #include "messages/stereo_image.h"
+#include "messages/visual_tracks.h"
 #include "scoring/flight_scorer.h"
 #include "semantics/semantic_map.h"
 
@@ -25,12 +26,12 @@ namespace arex::sim {
 
 /// Every file that a run, its report or a sweep writes into a run folder: what an older run in the
 /// same folder may have left. resolved.yaml stands last: it goes last, too.
-inline constexpr std::array<std::string_view, 23> kRunFiles{
+inline constexpr std::array<std::string_view, 24> kRunFiles{
     "summary.json", "truth.tum",    "estimate.tum",  "coverage.csv",       "events.csv",
     "timing.csv",   "cloud.pcd",    "map.bt",        "map2d.pgm",          "map2d.yaml",
     "report.html",  "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
     "infrared.csv", "semantic.pcd", "objects.csv",   "semantic.png",       "host.json",
-    "output.txt",   "failure.json", "resolved.yaml"};
+    "output.txt",   "failure.json", "vio_features.csv",   "resolved.yaml"};
 
 /// How many points the cloud had at a moment. Points are in the order of their first sight, so that
 /// the first `points` of cloud.pcd are the map of that moment.
@@ -55,6 +56,8 @@ class Recorder {
   void sample(Stamp stamp, const FlightSample& sample);
   /// How an infrared frame was taken, to infrared.csv.
   void images(Stamp stamp, const StereoImage& images, double mean_grey);
+  /// What a visual odometry followed in an exposure, to vio_features.csv.
+  void features(const std::vector<FeatureSight>& features);
   /// Every candidate of a decision with its terms, to decisions.csv.
   void decision(const Decision& decision);
   /// Makes what was recorded so far readable by others.
@@ -88,6 +91,7 @@ class Recorder {
   std::map<std::string, std::optional<GrowingFile>>
       others_;                           ///< NAME.tum of further odometry sources
   std::optional<GrowingFile> infrared_;  ///< made when the first frame comes
+  std::optional<GrowingFile> features_;  ///< likewise
   std::vector<std::string> failures_;
   std::atomic<bool> failed_ = false;
   mutable std::mutex mutex_;  ///< of failures_: the cloud is written in a job

@@ -199,6 +199,8 @@ void Simulation::record() {
       outlets_.bag->truth(now_, truth.X_WB, truth.v_WB, truth.w_WB_B);
     }
   }
+  const std::vector<FeatureSight> features = stack_->take_features();
+  if (recorder_) recorder_->features(features);
   for (const Decision& decision : stack_->take_decisions()) {
     exploration_.add(decision);
     if (recorder_) recorder_->decision(decision);

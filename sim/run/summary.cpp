@@ -66,9 +66,11 @@ void add_flight(const FlightScore& flight, Figures& figures) {
   figures.set("tracking.landing_error_m", flight.landing_error_m);
   add_figures(flight.odometry, "odometry", figures);
   if (!flight.poses.empty()) figures.set("odometry.lost_s", flight.odometry_lost_s);
+  add_figures(flight.tally, "odometry", figures);
   for (const auto& [name, source] : flight.others) {
     add_figures(source.score, "odometries." + name, figures);
     figures.set("odometries." + name + ".lost_s", source.lost_s);
+    add_figures(source.tally, "odometries." + name, figures);
   }
   add_figures(flight.clearance, figures);
   if (flight.landing) add_figures(*flight.landing, figures);

@@ -194,6 +194,9 @@ std::vector<FigureInfo> odometry_figures(const std::string& section, bool flies)
        "the same of the position"},
       {section + "lost_s", "time without odometry", "s", kLess, false,
        "status lost; null if there never was an estimate"},
+      {section + "tracked_mean", "landmarks in an image, mean", "", kNeither, false,
+       "of known depth, outliers left out; null of an odometry that sees no images"},
+      {section + "keyframes", "keyframes", "", kNeither, false, "of a visual odometry; null likewise"},
   };
 }
 
@@ -360,6 +363,13 @@ std::vector<ColumnInfo> map_and_decision_columns() {
       {"odometry_error.csv", "yaw_rad", "rad", "likewise"},
       {"cloud_growth.csv", "time_s", "s", "when it was counted"},
       {"cloud_growth.csv", "points", "", "of cloud.pcd that were there by then: its first ones"},
+      {"vio_features.csv", "time_s", "s",
+       "stamp of the exposure; the file is there with "
+       "odometry.visual_inertial.report_features"},
+      {"vio_features.csv", "id", "", "the same for one feature"},
+      {"vio_features.csv", "u", "", "column in the left image, px"},
+      {"vio_features.csv", "v", "", "row, px"},
+      {"vio_features.csv", "age", "", "exposures that have seen it"},
       {"infrared.csv", "time_s", "s", "true middle of the exposure"},
       {"infrared.csv", "exposure_s", "s", "how long the shutter was open"},
       {"infrared.csv", "gain", "", "of the amplifier"},

@@ -26,6 +26,14 @@ FlightScorer::FlightScorer(const Scene& scene, const Airframe& airframe, const P
                            ThinBranchMeter thin)
     : clearance_(scene, airframe), thin_(std::move(thin)), X_WO_(X_WB_start) {}
 
+void add_figures(const std::optional<VisualTally>& tally, const std::string& section,
+                 Figures& figures) {
+  if (!tally || tally->exposures == 0) return;
+  figures.set(section + ".tracked_mean",
+              static_cast<double>(tally->tracked) / static_cast<double>(tally->exposures));
+  figures.set(section + ".keyframes", static_cast<int>(tally->keyframes));
+}
+
 bool FlightScorer::Track::follow(const Odometry& odometry, const Truth& truth) {
   if (odometry.status == OdometryStatus::kLost) lost_s += to_seconds(kPeriod);
   if (odometry.status == OdometryStatus::kInitialising || odometry.stamp <= newest) return false;
@@ -131,6 +139,11 @@ FlightScore FlightScorer::score(const Truth& truth, const FlightView& view) cons
   score.odometry_lost_s = flown_.lost_s;
   for (const auto& [name, track] : others_) {
     if (!track.poses.empty()) score.others[name] = {track.score(), track.lost_s};
+  }
+  score.tally = view.tally;
+  for (const NamedOdometry& other : view.others) {
+    const auto found = score.others.find(std::string(other.name));
+    if (found != score.others.end()) found->second.tally = other.tally;
   }
   score.clearance = clearance_.statistics();
   if (view.state == MissionState::kDone) {

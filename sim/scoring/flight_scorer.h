@@ -20,7 +20,13 @@ namespace arex::sim {
 struct SourceScore {
   OdometryScore score;
   double lost_s = 0;
+  std::optional<VisualTally> tally{};  ///< of a visual one
 };
+
+/// Sets what a visual odometry's tally says of it.
+/// @param section "odometry", or "odometries.NAME"
+void add_figures(const std::optional<VisualTally>& tally, const std::string& section,
+                 Figures& figures);
 
 /// What a flight amounts to beside its outcome; most of summary.json. Not a number: there was
 /// nothing to measure.
@@ -34,6 +40,7 @@ struct FlightScore {
   std::vector<PosePair> poses;        ///< truth and estimate at 200 Hz
   OdometryScore odometry;
   double odometry_lost_s = 0;
+  std::optional<VisualTally> tally;           ///< of a visual odometry that flew
   std::map<std::string, SourceScore> others;  ///< of the sources that gave an estimate
   ClearanceMeter::Statistics clearance;
   std::optional<LandingScore> landing;  ///< of a vehicle that came down and disarmed

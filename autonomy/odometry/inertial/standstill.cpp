@@ -100,6 +100,8 @@ double shaken_angle(const WhiteNoise& measured, double mean_over_s) {
   return scatter_of_integral(measured.gyro) / std::hypot(1, kCut * kShakingEnds_hz * mean_over_s);
 }
 
+double shaken_speed(const WhiteNoise& measured) { return scatter_of_integral(measured.accel); }
+
 OdometryNeed missing_for_start(std::span<const ImuSample> samples,
                                const StaticInitialiserConfig& config) {
   if (samples.size() < 2) return OdometryNeed::kImu;

@@ -80,4 +80,7 @@ struct Standstill {
 /// @param mean_over_s of the mean of the angle over so long, as a scan sees it; 0: at an instant
 [[nodiscard]] double shaken_angle(const WhiteNoise& measured, double mean_over_s = 0);
 
+/// The same of the accelerometer's integral, m/s.
+[[nodiscard]] double shaken_speed(const WhiteNoise& measured);
+
 }  // namespace arex

@@ -1,0 +1,186 @@
+#include "odometry/visual/marginalisation.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "odometry/visual/window_solver.h"
+
+namespace arex {
+namespace {
+
+LinearRows stacked(const std::vector<LinearRows>& parts) {
+  Eigen::Index rows = 0;
+  for (const LinearRows& part : parts) rows += part.J.rows();
+  LinearRows all{Eigen::MatrixXd(rows, parts.front().J.cols()), Eigen::VectorXd(rows)};
+  Eigen::Index row = 0;
+  for (const LinearRows& part : parts) {
+    all.J.middleRows(row, part.J.rows()) = part.J;
+    all.r.segment(row, part.J.rows()) = part.r;
+    row += part.J.rows();
+  }
+  return all;
+}
+
+/// What the landmarks anchored in the oldest frame say of poses and camera, without their sights in
+/// the newest.
+LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
+  const WindowLayout layout = window.layout();
+  const int n = layout.visual_size();
+  NormalEquations equations = empty_equations(window);
+  const WindowExposures exposures(window, noise);
+  for (auto& [id, landmark] : window.landmarks) {
+    if (landmark.seen.front().frame != window.frames.front().number) continue;
+    if (noise.uses(landmark)) {
+      add_landmark(window, exposures, landmark, noise, window.newest().number, equations);
+    }
+  }
+  const ReducedEquations reduced = reduce(equations, 0);
+  const Eigen::MatrixXd H =
+      reduced.H.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
+  const LinearRows root = square_root(H, reduced.g.head(n));
+  LinearRows rows{Eigen::MatrixXd::Zero(root.J.rows(), layout.size()), root.r};
+  rows.J.leftCols(n) = root.J;
+  return rows;
+}
+
+/// Inverse depth of the landmark along its ray in another frame, 1/m.
+double inverse_depth_from(const Window& window, const Landmark& landmark, const Observation& seen) {
+  const Observation& anchor = landmark.seen.front();
+  const auto pose = [&](const Observation& o) {
+    const FrameState& x = window.frames[static_cast<std::size_t>(window.slot(o.frame))].state;
+    return Pose{x.R_OB, x.p_OB} * window.camera.X_BC;
+  };
+  const Vec3 p = pose(seen).inverse() *
+                 (pose(anchor) * Vec3(landmark.state.ray.homogeneous() /
+                                          landmark.state.inverse_depth));
+  constexpr double kNearest = 0.1;  // m
+  return p.z() > kNearest ? 1 / p.z() : 0;
+}
+
+/// Landmarks anchored in the oldest frame find another anchor, or go.
+void leave_oldest(Window& window, const WindowNoise& noise) {
+  const std::int64_t oldest = window.frames.front().number, newest = window.newest().number;
+  for (auto it = window.landmarks.begin(); it != window.landmarks.end();) {
+    Landmark& landmark = it->second;
+    if (landmark.seen.front().frame == oldest) {
+      if (noise.uses(landmark)) {
+        const Observation last = landmark.seen.back();
+        if (last.frame == newest) {
+          landmark.state = {last.left, inverse_depth_from(window, landmark, last)};
+          landmark.seen = {last};
+        } else {
+          landmark.seen.clear();
+        }
+      } else {
+        landmark.seen.erase(landmark.seen.begin());
+        if (!landmark.seen.empty()) landmark.state = {landmark.seen.front().left, 0};
+      }
+    }
+    it = landmark.seen.empty() ? window.landmarks.erase(it) : std::next(it);
+  }
+}
+
+}  // namespace
+
+LinearRows eliminate(const LinearRows& rows, const std::vector<int>& gone,
+                     const std::vector<int>& kept) {
+  LinearRows out{Eigen::MatrixXd::Zero(0, static_cast<Eigen::Index>(kept.size())), {}};
+  std::vector<int> columns;
+  const auto in_use = [&](int column) { return !rows.J.col(column).isZero(0); };
+  std::copy_if(gone.begin(), gone.end(), std::back_inserter(columns), in_use);
+  const auto first_kept = static_cast<Eigen::Index>(columns.size());
+  std::vector<Eigen::Index> places;  // of the columns kept and in use, in `out`
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (!in_use(kept[i])) continue;
+    columns.push_back(kept[i]);
+    places.push_back(static_cast<Eigen::Index>(i));
+  }
+  const Eigen::Index m = rows.J.rows(), n = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd A(m, n + 1);
+  for (Eigen::Index j = 0; j < n; ++j) A.col(j) = rows.J.col(columns[static_cast<std::size_t>(j)]);
+  A.col(n) = rows.r;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(A);
+  const Eigen::Index last = std::min(m, n);
+  const Eigen::Index count = std::max<Eigen::Index>(0, last - first_kept);
+  const Eigen::MatrixXd R = qr.matrixQR().triangularView<Eigen::Upper>();
+  out.J = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(kept.size()));
+  for (std::size_t j = 0; j < places.size(); ++j) {
+    out.J.col(places[j]) =
+        R.block(first_kept, first_kept + static_cast<Eigen::Index>(j), count, 1);
+  }
+  out.r = R.block(first_kept, n, count, 1);
+  return out;
+}
+
+LinearRows square_root(const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
+  // What rounding leaves of a direction without information, relative to the best one.
+  constexpr double kNothing = 1e-13;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(H);
+  const Eigen::VectorXd D = ldlt.vectorD();
+  const double least = kNothing * std::max(D.maxCoeff(), 1e-300);
+  const Eigen::MatrixXd L = ldlt.matrixL();
+  const Eigen::MatrixXd P =
+      ldlt.transpositionsP() * Eigen::MatrixXd::Identity(H.rows(), H.cols());
+  const Eigen::MatrixXd LtP = L.transpose() * P;
+  const Eigen::VectorXd y = L.triangularView<Eigen::UnitLower>().solve(
+      Eigen::VectorXd(P * g));
+  LinearRows out{Eigen::MatrixXd(H.rows(), H.cols()), Eigen::VectorXd(H.rows())};
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < D.size(); ++i) {
+    if (!(D[i] > least)) continue;
+    out.J.row(count) = std::sqrt(D[i]) * LtP.row(i);
+    out.r[count++] = y[i] / std::sqrt(D[i]);
+  }
+  out.J.conservativeResize(count, Eigen::NoChange);
+  out.r.conservativeResize(count);
+  return out;
+}
+
+void marginalise_oldest(Window& window, const WindowNoise& noise) {
+  const WindowLayout before = window.layout(), after{before.frames - 1};
+  const LinearRows rows =
+      stacked({prior_rows(window), imu_rows(window, 1, noise), landmark_rows(window, noise)});
+  std::vector<int> gone, kept(static_cast<std::size_t>(after.size()));
+  for (int i = 0; i < kFrameDim; ++i) gone.push_back(before.at(0, i));
+  for (int k = 0; k < after.frames; ++k) {
+    for (int i = 0; i < kFrameDim; ++i) {
+      kept[static_cast<std::size_t>(after.at(k, i))] = before.at(k + 1, i);
+    }
+  }
+  for (int i = 0; i < kCameraDim; ++i) {
+    kept[static_cast<std::size_t>(after.camera() + i)] = before.camera() + i;
+  }
+
+  WindowPrior prior;
+  prior.rows = eliminate(rows, gone, kept);
+  prior.camera = window.camera;
+  Eigen::VectorXd since = Eigen::VectorXd::Zero(after.size());  // the prior's states to today's
+  for (int k = 0; k < after.frames; ++k) {
+    const FrameState& at = linearised_at(window, k + 1, noise);
+    prior.frames.push_back(at);
+    const FrameError d = local(at, window.frames[static_cast<std::size_t>(k + 1)].state);
+    for (int i = 0; i < kFrameDim; ++i) since[after.at(k, i)] = d[i];
+  }
+  prior.rows.r.noalias() -= prior.rows.J * since;
+
+  leave_oldest(window, noise);
+  window.frames.erase(window.frames.begin());
+  window.frames.front().imu.reset();
+  window.prior = std::move(prior);
+}
+
+Preintegration drop_newest(Window& window) {
+  const std::int64_t number = window.newest().number;
+  for (auto it = window.landmarks.begin(); it != window.landmarks.end();) {
+    std::vector<Observation>& seen = it->second.seen;
+    if (seen.back().frame == number) seen.pop_back();
+    it = seen.empty() ? window.landmarks.erase(it) : std::next(it);
+  }
+  Preintegration imu = *window.newest().imu;
+  window.frames.pop_back();
+  return imu;
+}
+
+}  // namespace arex

@@ -17,6 +17,7 @@
 #include "messages/events.h"
 #include "messages/odometry_need.h"
 #include "messages/operator.h"
+#include "messages/registered_scan.h"
 #include "messages/sensors.h"
 #include "mission/mission.h"
 #include "planning/local_planner.h"
@@ -75,6 +76,8 @@ class FlightSoftware {
   virtual std::vector<Decision> take_decisions() = 0;
 
   [[nodiscard]] virtual FlightView view() const = 0;
+  /// What the view's grid was made from, for pictures of it; nothing where nobody keeps it.
+  [[nodiscard]] virtual MappedFrames mapped_frames() const { return {}; }
 
   /// What is done with the cloud off the flight's thread, and then on it.
   using CloudReader = std::function<std::function<void()>(const PointCloudMap& cloud)>;

@@ -98,7 +98,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 
 void Stack::add_scan(const LidarScanPtr& scan) {
   if (!scan->device.empty()) {  // for the maps only
-    perception_.add_scan(now_, *scan);
+    if (config_.mapping.takes(scan->device)) perception_.add_scan(now_, *scan);
     return;
   }
   lidar_watch_.add_scan(now_, *scan);
@@ -128,7 +128,7 @@ void Stack::collect(Source& source) {
   set_odometry(source.odometry->odometry());
   for (const RegisteredScan& scan : scans) {
     if (scan.jumped) start_again(scan.stamp);
-    perception_.add_scan(now_, scan);
+    if (config_.mapping.takes("")) perception_.add_scan(now_, scan);
   }
 }
 

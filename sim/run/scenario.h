@@ -107,6 +107,8 @@ struct ScenarioConfig {
     f.check(!devices.contains("imu") && !devices.contains("lidar") && !devices.contains("depth") &&
                 !devices.contains("mocap"),
             "devices with other names than imu, lidar, depth and mocap, which the first ones have");
+    f.check(stack.mapping.lidar.empty() || devices.contains(stack.mapping.lidar),
+            "mapping.lidar empty, or a name under devices");
     f.check(
         stack.mapping.enabled || std::none_of(commands.begin(), commands.end(), needs_a_planner),
         "mapping.enabled true, or commands without return and go_to, which are planned ways");

@@ -42,4 +42,11 @@ struct RegisteredDepth {
   DepthImagePtr image;
 };
 
+/// The newest frames that the local grid was given, the oldest first: as many as it holds, and
+/// those whose grid is still being made.
+struct MappedFrames {
+  std::vector<RegisteredScan> scans;
+  std::optional<RegisteredDepth> depth;
+};
+
 }  // namespace arex

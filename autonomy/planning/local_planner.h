@@ -54,6 +54,7 @@ struct PlanCounts {
   std::array<int, kPlanStageNames.size()> stages{};  ///< of the plans, by PlanStage
   int retimed = 0;                                   ///< timed anew to hold the limits
   int slowed = 0;                                    ///< for unknown space
+  int emergency_stops = 0;                           ///< for what no plan could still avoid
 
   void add(const PlanResult& result) {
     ++(result.ok() ? plans : failures);

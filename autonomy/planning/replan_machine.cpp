@@ -452,6 +452,7 @@ void ReplanMachine::stop(const GridView& grid, Stamp now, StuckCause cause) {
   adopt(std::move(flight));
   advance(now);  // a stop does not wait for the modelled planning time
   enter(ReplanState::kEmergencyStop, now);
+  ++counts_.emergency_stops;
   report(PlannerEventKind::kEmergencyStop, now, cause);
 }
 

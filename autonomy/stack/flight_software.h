@@ -17,6 +17,7 @@
 #include "messages/events.h"
 #include "messages/odometry_need.h"
 #include "messages/operator.h"
+#include "messages/registered_scan.h"
 #include "messages/sensors.h"
 #include "messages/stereo_image.h"
 #include "messages/visual_tracks.h"
@@ -47,7 +48,7 @@ struct FlightView {
   std::shared_ptr<const OccupancyMap2D> map_2d;  ///< null before the first
   double known_volume_m3;                        ///< when map_2d was taken
   const PlanCounts& plans;
-  OdometryNeed need;  ///< what keeps the odometry from being ok
+  OdometryNeed need;                   ///< what keeps the odometry from being ok
   std::optional<VisualTally> tally{};  ///< of a visual odometry that was to fly from the start
 };
 
@@ -82,6 +83,8 @@ class FlightSoftware {
   virtual std::vector<FeatureSight> take_features() { return {}; }
 
   [[nodiscard]] virtual FlightView view() const = 0;
+  /// What the view's grid was made from, for pictures of it; nothing where nobody keeps it.
+  [[nodiscard]] virtual MappedFrames mapped_frames() const { return {}; }
 
   /// What is done with the cloud off the flight's thread, and then on it.
   using CloudReader = std::function<std::function<void()>(const PointCloudMap& cloud)>;

@@ -12,6 +12,8 @@ constexpr Stamp kGlobalMapDue = kNanosecondsPerSecond / 5;
 // Nobody in the loop waits for the cloud: its host threads may work at it when they have nothing
 // more urgent.
 constexpr Stamp kCloudDue = kNanosecondsPerSecond;
+// Frames whose grid is still being made.
+constexpr std::size_t kUnderWay = 2;
 
 }  // namespace
 
@@ -39,12 +41,16 @@ void Perception::forget_local(Stamp now, Stamp jumped_at) {
   ++jumps_;
   jumped_at_ = jumped_at;
   grid_.reset();
+  scans_.clear();
+  depth_.reset();
   poses_.clear();
   jobs_.start(mapping_lane_, now, 0, [this]() -> JobQueue::Delivery {
     mapper_.forget_local();
     return nullptr;
   });
 }
+
+MappedFrames Perception::frames() const { return {{scans_.begin(), scans_.end()}, depth_}; }
 
 void Perception::add_scan(Stamp now, const RegisteredScan& scan) {
   if (scan.size() == 0 || scan.begin < jumped_at_) return;
@@ -60,6 +66,10 @@ void Perception::add_scan(Stamp now, const RegisteredScan& scan) {
     return [this] { cloud_cut_ = true; };
   });
   if (!config_.enabled) return;
+  scans_.push_back(scan);
+  if (scans_.size() > static_cast<std::size_t>(config_.local.lidar_frames) + kUnderWay) {
+    scans_.pop_front();
+  }
   const bool with_map_2d = now >= next_map_2d_;
   if (with_map_2d) next_map_2d_ = now + from_seconds(1 / config_.map_2d_rate_hz);
   // The local grid has to be there in time; the global map follows in its own lane.
@@ -98,6 +108,7 @@ void Perception::add_depth(Stamp now, const DepthImagePtr& depth) {
   if (!config_.enabled || poses_.empty() || !trusted_) return;
   if (depth->stamp < jumped_at_) return;
   const RegisteredDepth frame{poses_.at(depth->stamp) * vehicle_.X_BC(depth->device), depth};
+  depth_ = frame;
   jobs_.start(mapping_lane_, now, from_seconds(config_.latency_s),
               [this, frame, jumps = jumps_]() -> JobQueue::Delivery {
                 mapper_.integrate(frame);

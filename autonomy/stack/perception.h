@@ -1,6 +1,8 @@
 #pragma once
 
+#include <deque>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "jobs/job_queue.h"
@@ -35,6 +37,8 @@ class Perception {
 
   /// The newest local grid; null before the first frame.
   [[nodiscard]] const std::shared_ptr<const GridSnapshot>& grid() const { return grid_; }
+  /// The newest frames that went into it.
+  [[nodiscard]] MappedFrames frames() const;
   /// The newest 2D map; null before the first.
   [[nodiscard]] const std::shared_ptr<const OccupancyMap2D>& map_2d() const { return map_2d_; }
 
@@ -73,6 +77,8 @@ class Perception {
   Stamp jumped_at_ = 0;
   Stamp next_map_2d_ = 0;
   std::shared_ptr<const GridSnapshot> grid_;
+  std::deque<RegisteredScan> scans_;  ///< the newest, which share their points
+  std::optional<RegisteredDepth> depth_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;
   double known_volume_m3_ = 0;
   bool refusal_told_ = false;  ///< in jobs of the cloud's lane

@@ -83,8 +83,7 @@ Stack::Source Stack::make_source(const std::string& name, const std::string& lan
   }
   const OdometrySection& section = further->second;
   return {name, modules().odometry.at(section.type, name).make(section.own, {config_, seed_}),
-          jobs_.add_lane(lane),
-          from_seconds(section.latency_s.value_or(latency_of(section.type)))};
+          jobs_.add_lane(lane), from_seconds(section.latency_s.value_or(latency_of(section.type)))};
 }
 
 void Stack::add_imu(const ImuSample& imu) {
@@ -110,7 +109,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 
 void Stack::add_scan(const LidarScanPtr& scan) {
   if (!scan->device.empty()) {  // for the maps only
-    perception_.add_scan(now_, *scan);
+    if (config_.mapping.takes(scan->device)) perception_.add_scan(now_, *scan);
     return;
   }
   lidar_watch_.add_scan(now_, *scan);
@@ -159,7 +158,7 @@ void Stack::collect(Source& source) {
   set_odometry(switch_.in_common_frame(source.odometry->odometry()));
   for (const RegisteredScan& scan : scans) {
     if (scan.jumped) start_again(scan.stamp);
-    perception_.add_scan(now_, scan);
+    if (config_.mapping.takes("")) perception_.add_scan(now_, scan);
   }
 }
 

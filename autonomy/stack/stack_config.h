@@ -70,7 +70,8 @@ struct OdometryConfig {
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
     f("visual_inertial", visual_inertial, "visual-inertial odometry on the infrared pair");
     f("failover", failover,
-      "sources that may fly, the first while it can: [lidar_inertial, visual_inertial]; each a type "
+      "sources that may fly, the first while it can: [lidar_inertial, visual_inertial]; each a "
+      "type "
       "or a name under odometries. Empty: source alone");
     f("handover", handover, "from one of these to another");
     f("jump_m", jump_m, "a step of the pose beyond this makes the local grid and the plan anew");
@@ -92,6 +93,7 @@ struct MappingConfig {
   bool enabled = true;
   double resolution_m = 0.1;  ///< paper, III-A
   double latency_s = 0.020;   ///< modelled compute time of one frame
+  std::string lidar;          ///< empty: every one
   double depth_rate_hz = 10;
   double map_2d_rate_hz = 2;
   double cloud_range_m = 20;  ///< angle noise of 0.1 deg spreads what lies further over a voxel
@@ -103,6 +105,9 @@ struct MappingConfig {
     f("enabled", enabled, "local grid, OctoMap and 2D map: what the planner and the explorer need");
     f("resolution_m", resolution_m, "of the grids (paper, III-A)");
     f("latency_s", latency_s, "modelled compute time of one frame");
+    f("lidar", lidar,
+      "name under devices of the only LiDAR whose frames the maps take; empty: they take every "
+      "one's");
     f("depth_rate_hz", depth_rate_hz, "depth frames read; the others are never rendered");
     f("map_2d_rate_hz", map_2d_rate_hz, "how often the 2D map is handed on");
     f("cloud_range_m", cloud_range_m, "points further from the vehicle wait until it is nearer");
@@ -122,6 +127,11 @@ struct MappingConfig {
     f.check(depth_rate_hz > 0 && depth_rate_hz <= 30, "0 < depth_rate_hz <= 30");
     f.check(map_2d_rate_hz > 0 && map_2d_rate_hz <= 1000, "0 < map_2d_rate_hz <= 1000");
     f.check(cloud_range_m > 0 && cloud_range_m <= 1000, "0 < cloud_range_m <= 1000");
+  }
+
+  /// Whether frames of this LiDAR go into the maps. @param device its name, empty: the first
+  [[nodiscard]] bool takes(std::string_view device) const {
+    return lidar.empty() || lidar == device;
   }
 };
 

@@ -24,6 +24,7 @@ struct RunArguments {
   std::string bag_layout = "generic";     ///< see BagLayout
   std::string bag_compression = "none";   ///< or lz4
   std::vector<std::string> requirements;  ///< of the summary: field>=value
+  std::vector<std::string> snapshots;     ///< times of the mission, s
   std::string junit;                      ///< JUnit file to write; empty: none
   int threads = 0;                        ///< 0: one a core, four at most
   bool report = true;                     ///< also write report.html
@@ -45,12 +46,22 @@ struct PatternArguments {
 };
 int pattern(const PatternArguments& arguments);
 
+struct SparseArguments {
+  std::vector<std::string> thicknesses_m, distances_m, rates_hz;  ///< empty: a table of each
+  int frames = 40;                                                ///< of each case
+  std::vector<std::string> overrides;                             ///< --set key=value, of the LiDAR
+  std::optional<std::uint64_t> seed;
+  std::string out;  ///< folder to write
+};
+int sparse(const SparseArguments& arguments);
+
 struct RenderArguments {
   std::string folder;  ///< a run folder
   std::string out;     ///< FILE.png: a picture; FILE.mp4: a film
-  std::string what;    ///< infrared; empty: the flight in its world
+  std::string what;    ///< infrared, or a part of a snapshot; empty: the flight in its world
   std::string view;    ///< chase, top or both; empty: chase for a picture, both for a film
-  std::optional<double> time_s;  ///< of a picture; default the middle of the flight
+  std::optional<double> time_s;  ///< of a picture; default the middle of the flight, of a snapshot
+                                 ///< the only one
   std::optional<double> from_s;  ///< of a film; default the flight's start
   std::optional<double> to_s;    ///< of a film; default the flight's end
   int fps = 25;
@@ -75,6 +86,13 @@ struct SweepTaskArguments {
   std::uint64_t index = 0;
 };
 int sweep_task(const SweepTaskArguments& arguments);
+
+struct BlameArguments {
+  std::string folder;  ///< of a failed run
+  std::string out;     ///< folder to write; empty: the run's with -blame behind its name
+  int jobs = 0;        ///< flights at a time; 0: one a core
+};
+int blame(const BlameArguments& arguments);
 
 struct SemanticsArguments {
   std::string input;                   ///< a cloud (PCD, PLY) or a run folder

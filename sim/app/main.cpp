@@ -54,6 +54,10 @@ void add_run(CLI::App& app, RunArguments& arguments, int& exit_code) {
       ->add_option("--require", arguments.requirements,
                    "field>=value of the summary, else exit code 1; may be repeated")
       ->allow_extra_args(false);
+  command
+      ->add_option("--snapshot", arguments.snapshots,
+                   "mission time, s, at which to write what the vehicle sees; may be repeated")
+      ->allow_extra_args(false);
   command->add_option("--junit", arguments.junit, "also write the verdicts as JUnit XML");
   add_number(*command, "--threads", arguments.threads, Range<int>{1, 64},
              "host threads; the result does not change; default one a core, at most 4");
@@ -84,6 +88,26 @@ void add_pattern(CLI::App& app, PatternArguments& arguments, int& exit_code) {
   command->callback([&] { exit_code = pattern(arguments); });
 }
 
+void add_sparse(CLI::App& app, SparseArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "sparse", "how often one LiDAR frame misses a thin obstacle, CSV and page");
+  const auto add_list = [&](const char* name, std::vector<std::string>& values,
+                            const char* meaning) {
+    command->add_option(name, values, meaning)->delimiter(',')->allow_extra_args(false);
+  };
+  add_list("--thickness", arguments.thicknesses_m, "of upright bars, m");
+  add_list("--distance", arguments.distances_m, "to them, m");
+  add_list("--rate", arguments.rates_hz, "of the frames, Hz");
+  add_number(*command, "--frames", arguments.frames, Range<int>{5, 10'000}, "of each case");
+  command
+      ->add_option("--set", arguments.overrides,
+                   "key=value of the section lidar, as lidar.echo.dropout_probability=0")
+      ->allow_extra_args(false);
+  add_number(*command, "--seed", arguments.seed, kSeeds, "of the LiDAR's noise");
+  command->add_option("--out", arguments.out, "folder to write")->required();
+  command->callback([&] { exit_code = sparse(arguments); });
+}
+
 void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
   auto* command = app.add_subcommand("render", "draw a recorded flight, a picture or a film");
   command->add_option("folder", arguments.folder, "run folder")->required();
@@ -93,11 +117,13 @@ void add_render(CLI::App& app, RenderArguments& arguments, int& exit_code) {
                    "chase, top or both; default chase for a picture, both for a film")
       ->check(CLI::IsMember({"chase", "top", "both"}));
   command
-      ->add_option("--what", arguments.what,
-                   "infrared: the left infrared image, with the features followed in it")
-      ->check(CLI::IsMember({"infrared"}));
+      ->add_option(
+          "--what", arguments.what,
+          "infrared: the left infrared image, with the features followed in it; of a snapshot: "
+          "scan, cloud, grid or inflated_grid")
+      ->check(CLI::IsMember({"infrared", "scan", "cloud", "grid", "inflated_grid"}));
   add_number(*command, "--time", arguments.time_s, kMoments,
-             "moment of a picture, s; default the flight's middle");
+             "moment of a picture, s; default the flight's middle, or the only snapshot");
   add_number(*command, "--from", arguments.from_s, kMoments,
              "start of a film, s; default the flight's");
   add_number(*command, "--to", arguments.to_s, kMoments, "end of a film, s; default the flight's");
@@ -216,6 +242,16 @@ void add_semantics(CLI::App& app, SemanticsArguments& arguments, int& exit_code)
   command->callback([&] { exit_code = semantics(arguments); });
 }
 
+void add_blame(CLI::App& app, BlameArguments& arguments, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "blame", "fly a failed run again, truth in the place of one module at a time");
+  command->add_option("folder", arguments.folder, "run folder")->required();
+  command->add_option("--out", arguments.out, "folder to write; default RUN-blame");
+  add_number(*command, "--jobs", arguments.jobs, Range<int>{1, 64}, "flights at a time")
+      ->default_str("one a core");
+  command->callback([&] { exit_code = blame(arguments); });
+}
+
 void add_help(CLI::App& app, std::string& topic, int& exit_code) {
   auto* command = app.add_subcommand("help", "say what something is: help figures");
   command->add_option("topic", topic, "figures: every field of summary.json and column of the CSVs")
@@ -267,6 +303,7 @@ int execute(int argc, char** argv) {
   RunArguments run_arguments;
   WorldArguments world_arguments;
   PatternArguments pattern_arguments;
+  SparseArguments sparse_arguments;
   RenderArguments render_arguments;
   SweepArguments sweep_arguments;
   SweepTaskArguments sweep_task_arguments;
@@ -274,12 +311,14 @@ int execute(int argc, char** argv) {
   ReplayArguments replay_arguments;
   EvaluateArguments evaluate_arguments;
   SemanticsArguments semantics_arguments;
+  BlameArguments blame_arguments;
   ScenarioArguments params_arguments;
   ScenarioArguments validate_arguments;
   std::string help_topic;
   add_run(app, run_arguments, exit_code);
   add_world(app, world_arguments, exit_code);
   add_pattern(app, pattern_arguments, exit_code);
+  add_sparse(app, sparse_arguments, exit_code);
   add_render(app, render_arguments, exit_code);
   add_sweep(app, sweep_arguments, exit_code);
   add_sweep_task(app, sweep_task_arguments, exit_code);
@@ -287,6 +326,7 @@ int execute(int argc, char** argv) {
   add_replay(app, replay_arguments, exit_code);
   add_evaluate(app, evaluate_arguments, exit_code);
   add_semantics(app, semantics_arguments, exit_code);
+  add_blame(app, blame_arguments, exit_code);
   add_help(app, help_topic, exit_code);
   auto* params_command = app.add_subcommand("params", "list every parameter");
   add_scenario_options(*params_command, params_arguments, false);

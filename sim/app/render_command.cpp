@@ -16,6 +16,7 @@
 #include "report/run_record.h"
 #include "run/file_io.h"
 #include "run/scenario.h"
+#include "run/snapshot_reader.h"
 
 namespace arex::app {
 namespace {
@@ -110,6 +111,18 @@ void draw_film(const RenderArguments& arguments, const worlds::World& world, con
   }
 }
 
+// A part of a snapshot: no world is needed.
+int draw_part(const RenderArguments& arguments) {
+  const auto named =
+      std::find(sim::kSnapshotParts.begin(), sim::kSnapshotParts.end(), arguments.what);
+  const auto part = static_cast<sim::SnapshotPart>(named - sim::kSnapshotParts.begin());
+  check_writable(arguments.out);
+  const sim::ReadSnapshot read = sim::read_snapshot(arguments.folder, part, arguments.time_s);
+  sim::save_png(sim::draw_snapshot(read.snapshot, part), arguments.out);
+  std::printf("%s: %s at %s s\n", arguments.out.c_str(), arguments.what.c_str(), read.name.c_str());
+  return 0;
+}
+
 }  // namespace
 
 int render(const RenderArguments& arguments) {
@@ -126,6 +139,7 @@ int render(const RenderArguments& arguments) {
                       (std::filesystem::exists(folder) ? ": holds no run" : ": does not exist") +
                       ", expected a run folder");
   }
+  if (!arguments.what.empty() && arguments.what != "infrared") return draw_part(arguments);
   const std::vector<sim::TimedPose> truth = sim::read_tum(folder / "truth.tum");
   if (truth.size() < 2) {
     throw ConfigError((folder / "truth.tum").string() +

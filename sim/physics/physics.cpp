@@ -62,10 +62,14 @@ class Physics::Impl {
     contacts_.clear();
   }
 
-  void step(const MotorCommand& command) {
+  void step(const MotorCommand& command, const CarriedMotion* carry) {
     powertrain_.step(command);
     wind_.step();
-    apply_forces();
+    if (carry) {
+      apply_wrench(*carry);
+    } else {
+      apply_forces();
+    }
     scene_.update(truth_.X_WB.p);
     scene_.step(*data_, truth_.X_WB);
     check_health();
@@ -106,10 +110,27 @@ class Physics::Impl {
     force += drag;
     torque += airframe.p_BBcm.cross(drag);
 
-    // The free joint's generalised force: in W at B's origin, and about B's origin in B.
-    const Vec3 force_W = truth_.X_WB.R * force;
+    apply(truth_.X_WB.R * force, torque);
+  }
+
+  // Newton and Euler about the centre of mass, moved to B's origin.
+  void apply_wrench(const CarriedMotion& carry) {
+    const Airframe& airframe = scene_.airframe();
+    const Vec3& w = truth_.w_WB_B;
+    const Vec3& p_BBcm = airframe.p_BBcm;
+    const Vec3 a_cm_B = truth_.X_WB.R.transpose() * (carry.a_WB + Vec3(0, 0, kGravity)) +
+                        carry.alpha_WB_B.cross(p_BBcm) + w.cross(w.cross(p_BBcm));
+    const Vec3 force = airframe.mass_kg * a_cm_B;
+    const Vec3 spin = airframe.inertia_kgm2 * w;
+    const Vec3 torque =
+        airframe.inertia_kgm2 * carry.alpha_WB_B + w.cross(spin) + p_BBcm.cross(force);
+    apply(truth_.X_WB.R * force, torque);
+  }
+
+  // The free joint's generalised force: in W at B's origin, and about B's origin in B.
+  void apply(const Vec3& force_W, const Vec3& torque_B) {
     std::copy_n(force_W.data(), 3, data_->qfrc_applied);
-    std::copy_n(torque.data(), 3, data_->qfrc_applied + 3);
+    std::copy_n(torque_B.data(), 3, data_->qfrc_applied + 3);
   }
 
   void check_health() const {
@@ -182,7 +203,10 @@ Physics::~Physics() = default;
 Physics::Physics(Physics&&) noexcept = default;
 Physics& Physics::operator=(Physics&&) noexcept = default;
 
-void Physics::step(const MotorCommand& command) { impl_->step(command); }
+void Physics::step(const MotorCommand& command) { impl_->step(command, nullptr); }
+void Physics::step(const MotorCommand& command, const CarriedMotion& carry) {
+  impl_->step(command, &carry);
+}
 const Truth& Physics::truth() const { return impl_->truth_; }
 const BatteryState& Physics::battery() const { return impl_->powertrain_.battery(); }
 const Powertrain& Physics::powertrain() const { return impl_->powertrain_; }

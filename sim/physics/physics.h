@@ -25,6 +25,12 @@ struct Contact {
   bool collision = false;  ///< more than a leg standing on the ground or brushing something slowly
 };
 
+/// What a vehicle that is carried shall do during a tick.
+struct CarriedMotion {
+  Vec3 a_WB = Vec3::Zero();        ///< acceleration of B's origin, m/s^2, in W
+  Vec3 alpha_WB_B = Vec3::Zero();  ///< angular acceleration, rad/s^2, in B
+};
+
 /// The vehicle in its world: MuJoCo's rigid body and contacts, motors, battery, drag and wind.
 /// Ticks at 1 kHz; a run is a function of its configuration, world, seed and commands.
 class Physics {
@@ -39,6 +45,9 @@ class Physics {
   /// Holds `command` for one tick.
   /// @throws std::runtime_error if MuJoCo's state diverges.
   void step(const MotorCommand& command);
+  /// The same of a vehicle that is carried: the rotors turn and take their current, but what moves
+  /// it, gravity and contacts aside, is the wrench that `carry` takes in free air.
+  void step(const MotorCommand& command, const CarriedMotion& carry);
 
   [[nodiscard]] const Truth& truth() const;
   [[nodiscard]] const BatteryState& battery() const;

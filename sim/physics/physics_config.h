@@ -189,6 +189,7 @@ struct BodyConfig {
 };
 
 struct PhysicsConfig {
+  bool perfect_tracking = false;
   BodyConfig body;  ///< its keys stand directly under `physics`
   MotorConfig motor;
   RotorConfig rotor;
@@ -198,6 +199,10 @@ struct PhysicsConfig {
   ContactConfig contact;
 
   void fields(auto& f) {
+    f("perfect_tracking", perfect_tracking,
+      "an oracle, for ablation: while it tracks a setpoint the vehicle is carried along it "
+      "exactly, "
+      "and neither rotors nor air move it");
     body.fields(f);
     f("motor", motor, "motor and speed controller");
     f("rotor", rotor, "propeller");

@@ -1,12 +1,17 @@
 #include "run/device_types.h"
 
+#include <algorithm>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "run/scenario.h"
+#include "scoring/surface_samples.h"
 #include "sensors/depth_device.h"
 #include "sensors/infrared_device.h"
 #include "sensors/lidar_device.h"
 #include "sensors/spinning_lidar.h"
+#include "sensors/survey_lidar.h"
 
 namespace arex::sim {
 namespace {
@@ -17,6 +22,18 @@ using DeviceTypes = Registry<Device, DeviceMaking>;
 DeviceContext looking_forward(DeviceContext context) {
   context.X_BS.R = context.X_BS.R * MountConfig::forward();
   return context;
+}
+
+std::unique_ptr<Device> make_survey(const SurveyConfig& config, const DeviceContext& context) {
+  // So dense that what is a little larger than a third of a cube's face has a sample.
+  SurfaceSampleConfig samples;
+  samples.sample_area_m2 = std::max(0.002, 0.4 * config.spacing_m * config.spacing_m);
+  samples.sample_height_m = config.height_m;
+  std::vector<Vec3f> points =
+      one_per_cube(sample_surfaces(context.world, context.world.bounds, samples), config.spacing_m);
+  return std::make_unique<LidarDevice>(
+      std::make_unique<SurveyLidar>(config, context.scene, std::move(points), context.X_BS),
+      config.latency_s, context);
 }
 
 DeviceTypes make_types() {
@@ -40,6 +57,11 @@ DeviceTypes make_types() {
             std::make_unique<SpinningLidar>(config, context.scene, context.X_BS,
                                             context.airframe.shapes, context.seed),
             config.latency_s, context);
+      });
+  types.add<SurveyConfig>(
+      "survey", "an oracle, for ablation: exact points of all surfaces in sight, all around",
+      [](const SurveyConfig& config, const DeviceMaking& making) {
+        return make_survey(config, making.context);
       });
   return types;
 }

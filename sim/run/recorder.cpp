@@ -11,6 +11,7 @@
 
 #include "mapping/cloud_io.h"
 #include "mapping/map_files.h"
+#include "run/snapshot.h"
 #include "run/summary.h"
 #include "scoring/figures.h"
 #include "semantics/cloud_file.h"
@@ -48,6 +49,7 @@ void remove_older_run(const std::filesystem::path& directory) {
   }
   std::error_code none;
   for (const auto& draft : drafts) std::filesystem::remove(draft, none);
+  remove_snapshots(directory);
   for (const std::string_view name : kRunFiles) {
     std::error_code error;
     std::filesystem::remove(directory / name, error);

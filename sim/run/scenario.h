@@ -114,6 +114,8 @@ struct ScenarioConfig {
                      [&](std::string_view name) { return devices.contains(std::string(name)); }),
         "devices with other names than imu, lidar, depth, infrared and mocap, which the first "
         "ones have");
+    f.check(stack.mapping.lidar.empty() || devices.contains(stack.mapping.lidar),
+            "mapping.lidar empty, or a name under devices");
     f.check(
         stack.mapping.enabled || std::none_of(commands.begin(), commands.end(), needs_a_planner),
         "mapping.enabled true, or commands without return and go_to, which are planned ways");

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "run/device_types.h"
+#include "run/perfect_tracking.h"
 #include "sensors/board_device.h"
 #include "sensors/mocap_device.h"
 #include "stack/stack.h"
@@ -165,10 +166,27 @@ void Simulation::run_autopilot() {
   hash_.add(motors_.throttle);
 }
 
+// Without odometry there is nothing to be carried along: the autopilot levels the vehicle and
+// brings it down.
+std::optional<CarriedMotion> Simulation::carried_motion() const {
+  if (!config_.physics.perfect_tracking) return std::nullopt;
+  const FlightView view = stack_->view();
+  if (!has_setpoint(view)) return std::nullopt;
+  if (autopilot_.state() == AutopilotState::kDescending) {
+    return carried_down(config_.autopilot.descent_speed_mps, physics_.truth());
+  }
+  if (autopilot_.state() != AutopilotState::kFlying) return std::nullopt;
+  return carried_along(view, physics_.truth());
+}
+
 void Simulation::step_physics() {
   const StageTimer::Scope timed(timers_.physics);
   previous_truth_ = physics_.truth();
-  physics_.step(motors_);
+  if (const auto motion = carried_motion()) {
+    physics_.step(motors_, *motion);
+  } else {
+    physics_.step(motors_);
+  }
   now_ += kTick;
   const Truth& truth = physics_.truth();
   hash_.add({truth.X_WB.R.data(), 9});

@@ -98,6 +98,7 @@ class Simulation {
   [[nodiscard]] Stamp now() const { return now_; }
   [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
   [[nodiscard]] FlightView view() const { return stack_->view(); }
+  [[nodiscard]] MappedFrames mapped_frames() const { return stack_->mapped_frames(); }
   // Of what was flown so far.
   [[nodiscard]] std::string trajectory_hash() const { return hash_.text(); }
   [[nodiscard]] std::map<std::string, std::string> device_hashes() const;
@@ -110,6 +111,8 @@ class Simulation {
   void run_stack();
   void run_autopilot();
   void step_physics();
+  /// Nothing where rotors and air move the vehicle.
+  [[nodiscard]] std::optional<CarriedMotion> carried_motion() const;
   void record();
   void check_end();
   void end(Outcome outcome, const std::string& reason);

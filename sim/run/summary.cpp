@@ -92,6 +92,8 @@ void add_planner(const FlightResult& result, Figures& figures) {
   figures.set("planner.failures", result.plans.failures);
   figures.set("planner.retimed", result.plans.retimed);
   figures.set("planner.slowed", result.plans.slowed);
+  figures.set("planner.emergency_stops", result.plans.emergency_stops);
+  figures.set("planner.own_cell_blocked_fraction", result.flight.own_cell_blocked_fraction);
   for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
     figures.set("planner.stages." + std::string(kPlanStageNames[stage]),
                 result.plans.stages[stage]);

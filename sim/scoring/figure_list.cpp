@@ -196,7 +196,8 @@ std::vector<FigureInfo> odometry_figures(const std::string& section, bool flies)
        "status lost; null if there never was an estimate"},
       {section + "tracked_mean", "landmarks in an image, mean", "", kNeither, false,
        "of known depth, outliers left out; null of an odometry that sees no images"},
-      {section + "keyframes", "keyframes", "", kNeither, false, "of a visual odometry; null likewise"},
+      {section + "keyframes", "keyframes", "", kNeither, false,
+       "of a visual odometry; null likewise"},
   };
 }
 
@@ -210,6 +211,11 @@ std::vector<FigureInfo> flight_figures() {
       {"planner.failures", "plans failed", "", kLess, true, "that found no way"},
       {"planner.retimed", "plans timed anew", "", kNeither, false, "to hold the limits"},
       {"planner.slowed", "plans slowed", "", kNeither, false, "for unknown space ahead"},
+      {"planner.emergency_stops", "emergency stops", "", kLess, false,
+       "for what no plan could still avoid"},
+      {"planner.own_cell_blocked_fraction", "time in the inflation", "1", kLess, false,
+       "share of the way, at 20 Hz, on which the vehicle's own cell was inflated or occupied in "
+       "its local grid; null without a grid"},
       {"tracking.rmse_m", "tracking error, RMS", "m", kLess, true,
        "true position against the setpoint from take-off until it begins to land; null if it "
        "never flew"},

@@ -89,6 +89,10 @@ FlightSample FlightScorer::sample(const Truth& truth, const FlightView& view, bo
   if (truth.stamp % kRowPeriod != 0) return sample;
   const bool en_route = is_en_route(state);
   const double clearance = en_route ? clearance_.measure(truth) : kUnknown;
+  if (en_route && view.grid) {
+    ++grid_count_;
+    blocked_count_ += view.grid->view.inflated(odometry.X_OB.p);
+  }
   if (const auto& grid = view.grid; en_route && grid && !thin_.empty()) {
     thin_.observe(truth, odometry.X_OB, grid->view);
   }
@@ -133,6 +137,10 @@ FlightScore FlightScorer::score(const Truth& truth, const FlightView& view) cons
     score.tracking_rmse_m = std::sqrt(tracking_sum_ / static_cast<double>(tracking_count_));
   }
   score.landing_error_m = landing_error(truth, view);
+  if (grid_count_ > 0) {
+    score.own_cell_blocked_fraction =
+        static_cast<double>(blocked_count_) / static_cast<double>(grid_count_);
+  }
   score.target_miss_m = target_miss_m_;
   score.poses = flown_.poses;
   score.odometry = flown_.score();

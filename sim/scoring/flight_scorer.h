@@ -43,6 +43,8 @@ struct FlightScore {
   std::optional<VisualTally> tally;           ///< of a visual odometry that flew
   std::map<std::string, SourceScore> others;  ///< of the sources that gave an estimate
   ClearanceMeter::Statistics clearance;
+  /// Share of the way, 20 Hz, on which the vehicle's own cell was inflated or occupied in its grid.
+  double own_cell_blocked_fraction = std::numeric_limits<double>::quiet_NaN();
   std::optional<LandingScore> landing;  ///< of a vehicle that came down and disarmed
   std::optional<ThinBranchScore> thin;  ///< where the world has thin branches
 };
@@ -116,6 +118,8 @@ class FlightScorer {
   double distance_m_ = 0;
   double tracking_sum_ = 0;
   std::size_t tracking_count_ = 0;
+  std::size_t grid_count_ = 0;     ///< rows en route with a grid
+  std::size_t blocked_count_ = 0;  ///< of these with the vehicle's own cell blocked
   std::vector<double> target_miss_m_;
   std::optional<Vec3> landing_O_;  ///< the target above which it began to land
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <unordered_set>
 
 #include "math/random.h"
 #include "scoring/map_error.h"
@@ -138,6 +140,22 @@ std::vector<SurfaceSample> sample_surfaces(const World& world, const Bounds& reg
     area_before = area_after;
   }
   return samples;
+}
+
+std::vector<Vec3f> one_per_cube(const std::vector<SurfaceSample>& samples, double edge_m) {
+  constexpr int kBits = 21;  // of each coordinate in a key; worlds are smaller than 50 km
+  constexpr std::int64_t kMiddle = std::int64_t{1} << (kBits - 1);
+  std::unordered_set<std::uint64_t> taken;
+  std::vector<Vec3f> points;
+  for (const SurfaceSample& sample : samples) {
+    std::uint64_t key = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double cell = std::floor(static_cast<double>(sample.p_W[axis]) / edge_m);
+      key = key << kBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + kMiddle);
+    }
+    if (taken.insert(key).second) points.push_back(sample.p_W);
+  }
+  return points;
 }
 
 }  // namespace arex::sim

@@ -35,4 +35,7 @@ std::vector<SurfaceSample> sample_surfaces(const worlds::World& world,
                                            const worlds::Bounds& region_W,
                                            const SurfaceSampleConfig& config = {});
 
+/// Where the samples lie, of all that share a cube of this edge in W only the first.
+std::vector<Vec3f> one_per_cube(const std::vector<SurfaceSample>& samples, double edge_m);
+
 }  // namespace arex::sim

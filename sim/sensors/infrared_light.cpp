@@ -14,7 +14,8 @@ constexpr double kLeastSide = 1;            // of a world, m
 constexpr int kMostAlong = 400;             // an axis
 constexpr double kLampReach = 9;            // further lamps give less than 2 lx, m
 constexpr double kLampNearest = 1.0;        // a strip is no point: nearer counts as this, m
-constexpr double kLampUp = 0.05;            // share of its intensity that goes up and sideways
+constexpr double kLampUp = 0.05;            // its intensity upwards, of that straight down
+constexpr double kLampLevel = 0.25;         // and just below the level
 constexpr double kMostAlbedo = 0.8;         // retro-reflectors send little anywhere else
 constexpr double kFurtherBounces = 1.35;  // 1 / (1 - albedo): light is followed for one bounce only
 constexpr double kGroundAlbedo = 0.25;    // of what lies outside of the world
@@ -77,7 +78,8 @@ class Baker {
     sun_lx_ = light.sun ? light.sun_lx : 0;
     sky_ = light.sky_lx / kPi;  // a face that sees all of it gets sky_lx
     ground_ = kGroundAlbedo * (light.sky_lx + sun_lx_ * std::sin(light.sun_elevation_rad)) / kPi;
-    intensity_ = light.lamp_flux_lm / (kPi * (1 + kLampUp));
+    // Of flux F, over both half spaces: 2 pi (up + level + (1 - level) / 2) I = F.
+    intensity_ = light.lamp_flux_lm / (kPi * (2 * kLampUp + 1 + kLampLevel));
   }
 
   /// From sky and lamps.
@@ -112,9 +114,10 @@ class Baker {
     // Its own box is not in its way.
     constexpr double kOwn = 0.2;
     if (distance > kOwn && scene_.cast(p, direction, distance - kOwn).valid()) return;
-    const double down = std::max(0.0, direction.z());
+    const double down = direction.z();
+    const double towards = down > 0 ? kLampLevel + (1 - kLampLevel) * down : kLampUp;
     const double far = std::max(distance, kLampNearest);
-    add_from(direction, intensity_ * (kLampUp + (1 - kLampUp) * down) / (far * far), faces);
+    add_from(direction, intensity_ * towards / (far * far), faces);
   }
   [[nodiscard]] double illuminance(const RayHit& hit, const Vec3f& from, const Vec3f& direction,
                                    const LightGrid& grid) const {

@@ -54,7 +54,7 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
       renderer_(world, fine_, {.far_m = light.draw_range_m}),
       lamp_lx_(static_cast<float>(light.lamp_flux_lm / kStripArea)),
       pixel_rad_(static_cast<float>(1 / camera.fx)),
-      off_surface_m_(static_cast<float>(0.75 * grid_.spacing_m())) {
+      off_surface_m_(static_cast<float>(0.6 * grid_.spacing_m())) {
   for (int u = 0; u < camera.width; ++u) {
     column_x_.push_back(static_cast<float>((u - camera.cx) / camera.fx));
   }

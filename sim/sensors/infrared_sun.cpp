@@ -8,9 +8,10 @@
 namespace arex::sim {
 namespace {
 
-// The sun's place, in radii of the world: at its border, rays differ from parallel ones by 1.4
-// degrees, three times what the sun itself is wide.
-constexpr double kDistance = 40;
+// The sun's place, in radii of the world: at its border, rays differ from parallel ones by a
+// seventh of a degree, less than the sun is wide. Further off, single precision would have too few
+// digits.
+constexpr double kDistance = 400;
 constexpr double kLeast = 1.0;       // radius of a world, m
 constexpr double kLiftTexels = 2.5;  // of a surface before it is asked for, against shading itself
 

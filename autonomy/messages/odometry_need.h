@@ -20,9 +20,8 @@ enum class OdometryNeed {
   kFeatures,        ///< images, but too little in them to follow
 };
 inline constexpr std::array<std::string_view, 11> kOdometryNeedNames{
-    "nothing",   "no_imu",           "gyro_bias",
-    "gyro_noise", "accel_noise",     "accel_magnitude",
-    "no_scan",   "nothing_to_register", "no_mocap",
-    "no_images", "nothing_to_follow"};
+    "nothing",     "no_imu",          "gyro_bias",        "gyro_noise",
+    "accel_noise", "accel_magnitude", "no_scan",          "nothing_to_register",
+    "no_mocap",    "no_images",       "nothing_to_follow"};
 
 }  // namespace arex

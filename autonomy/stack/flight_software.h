@@ -47,7 +47,7 @@ struct FlightView {
   std::shared_ptr<const OccupancyMap2D> map_2d;  ///< null before the first
   double known_volume_m3;                        ///< when map_2d was taken
   const PlanCounts& plans;
-  OdometryNeed need;  ///< what keeps the odometry from being ok
+  OdometryNeed need;                   ///< what keeps the odometry from being ok
   std::optional<VisualTally> tally{};  ///< of a visual odometry that was to fly from the start
 };
 

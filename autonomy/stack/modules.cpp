@@ -27,13 +27,14 @@ void register_shipped(Modules& to) {
                      return std::make_unique<LidarInertialSource>(
                          read_over(config.odometry.lidar_inertial, section), config.vehicle);
                    }});
-  to.odometry.add({std::string(kVisualInertial), "sliding window on the infrared pair (VINS family)",
+  to.odometry.add({std::string(kVisualInertial),
+                   "sliding window on the infrared pair (VINS family)",
                    given_parameters<VisualInertialConfig>,
                    [](const ConfigNode& section, const ModuleContext& context) {
                      const StackConfig& config = context.config;
                      return std::make_unique<VisualInertialSource>(
-                         read_over(config.odometry.visual_inertial, section),
-                         config.vehicle.X_BC(), context.seed);
+                         read_over(config.odometry.visual_inertial, section), config.vehicle.X_BC(),
+                         context.seed);
                    }});
   to.odometry.add<NoParameters>("mocap", "the true pose: the oracle, for ablations",
                                 [](const NoParameters&, const ModuleContext& context) {

@@ -77,8 +77,7 @@ std::optional<std::size_t> OdometrySwitch::update(const std::vector<const Odomet
   flying_ = *next;
   const Odometry laid = moved(*sources[flying_], frames_[flying_]);
   rest_.yaw_rad = so3::wrap(so3::yaw(common_.X_OB.R) - so3::yaw(laid.X_OB.R));
-  rest_.shift_m =
-      common_.X_OB.p - laid.X_OB.p - to_seconds(common_.stamp - laid.stamp) * laid.v_OB;
+  rest_.shift_m = common_.X_OB.p - laid.X_OB.p - to_seconds(common_.stamp - laid.stamp) * laid.v_OB;
   return next;
 }
 

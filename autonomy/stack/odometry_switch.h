@@ -45,8 +45,8 @@ class OdometrySwitch {
   std::optional<std::size_t> update(const std::vector<const Odometry*>& sources);
 
   [[nodiscard]] std::size_t flying() const { return flying_; }
-  /// The flying source's estimate in the frame that the vehicle flies in. To be called once for each
-  /// new estimate, in order.
+  /// The flying source's estimate in the frame that the vehicle flies in. To be called once for
+  /// each new estimate, in order.
   [[nodiscard]] Odometry in_common_frame(const Odometry& odometry);
 
  private:

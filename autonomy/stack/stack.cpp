@@ -83,8 +83,7 @@ Stack::Source Stack::make_source(const std::string& name, const std::string& lan
   }
   const OdometrySection& section = further->second;
   return {name, modules().odometry.at(section.type, name).make(section.own, {config_, seed_}),
-          jobs_.add_lane(lane),
-          from_seconds(section.latency_s.value_or(latency_of(section.type)))};
+          jobs_.add_lane(lane), from_seconds(section.latency_s.value_or(latency_of(section.type)))};
 }
 
 void Stack::add_imu(const ImuSample& imu) {

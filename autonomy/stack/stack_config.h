@@ -70,7 +70,8 @@ struct OdometryConfig {
     f("lidar_inertial", lidar_inertial, "LiDAR-inertial odometry");
     f("visual_inertial", visual_inertial, "visual-inertial odometry on the infrared pair");
     f("failover", failover,
-      "sources that may fly, the first while it can: [lidar_inertial, visual_inertial]; each a type "
+      "sources that may fly, the first while it can: [lidar_inertial, visual_inertial]; each a "
+      "type "
       "or a name under odometries. Empty: source alone");
     f("handover", handover, "from one of these to another");
     f("jump_m", jump_m, "a step of the pose beyond this makes the local grid and the plan anew");

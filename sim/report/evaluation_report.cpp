@@ -132,8 +132,8 @@ std::string tracks_figure_html(const Comparison& comparison, const std::string& 
         view.polyline(comparison.estimates[i].evaluation.pairs, &PosePair::X_OB, svg_line_class(i));
   }
   svg += svg_ends(view(pairs.front().X_WB), view(pairs.back().X_WB), unit);
-  return "<figure>\n" + svg + svg_scale_bar(box, unit) +
-         "</svg>\n<figcaption class=\"map-key\">" + key_html(names) +
+  return "<figure>\n" + svg + svg_scale_bar(box, unit) + "</svg>\n<figcaption class=\"map-key\">" +
+         key_html(names) +
          "<span><i style=\"border-color:var(--truth);border-top-style:dashed\"></i>reference</span>"
          "<span><i class=\"ring\"></i>start</span><span style=\"color:var(--bad)\">× end</span>"
          "</figcaption>\n</figure>\n";

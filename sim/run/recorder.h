@@ -27,11 +27,11 @@ namespace arex::sim {
 /// Every file that a run, its report or a sweep writes into a run folder: what an older run in the
 /// same folder may have left. resolved.yaml stands last: it goes last, too.
 inline constexpr std::array<std::string_view, 24> kRunFiles{
-    "summary.json", "truth.tum",    "estimate.tum",  "coverage.csv",       "events.csv",
-    "timing.csv",   "cloud.pcd",    "map.bt",        "map2d.pgm",          "map2d.yaml",
-    "report.html",  "flight.csv",   "decisions.csv", "odometry_error.csv", "cloud_growth.csv",
-    "infrared.csv", "semantic.pcd", "objects.csv",   "semantic.png",       "host.json",
-    "output.txt",   "failure.json", "vio_features.csv",   "resolved.yaml"};
+    "summary.json", "truth.tum",    "estimate.tum",     "coverage.csv",       "events.csv",
+    "timing.csv",   "cloud.pcd",    "map.bt",           "map2d.pgm",          "map2d.yaml",
+    "report.html",  "flight.csv",   "decisions.csv",    "odometry_error.csv", "cloud_growth.csv",
+    "infrared.csv", "semantic.pcd", "objects.csv",      "semantic.png",       "host.json",
+    "output.txt",   "failure.json", "vio_features.csv", "resolved.yaml"};
 
 /// How many points the cloud had at a moment. Points are in the order of their first sight, so that
 /// the first `points` of cloud.pcd are the map of that moment.

@@ -196,7 +196,8 @@ std::vector<FigureInfo> odometry_figures(const std::string& section, bool flies)
        "status lost; null if there never was an estimate"},
       {section + "tracked_mean", "landmarks in an image, mean", "", kNeither, false,
        "of known depth, outliers left out; null of an odometry that sees no images"},
-      {section + "keyframes", "keyframes", "", kNeither, false, "of a visual odometry; null likewise"},
+      {section + "keyframes", "keyframes", "", kNeither, false,
+       "of a visual odometry; null likewise"},
   };
 }
 

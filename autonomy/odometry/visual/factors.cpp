@@ -30,10 +30,10 @@ Corrected corrected(const Preintegration& imu, const FrameState& from) {
 /// A landmark on its way from the anchor's ray to an eye, all times its inverse depth, so that a
 /// point at infinity is none to divide by.
 struct Path {
-  Vec3 ray;   ///< anchor's, in its C
-  Vec3 in_Bi; ///< in the anchor's B
-  Vec3 in_Bj; ///< in the observer's B
-  Vec3 in_Cj; ///< in the observer's C
+  Vec3 ray;    ///< anchor's, in its C
+  Vec3 in_Bi;  ///< in the anchor's B
+  Vec3 in_Bj;  ///< in the observer's B
+  Vec3 in_Cj;  ///< in the observer's C
   Vec3 in_eye;
 };
 
@@ -86,8 +86,8 @@ ImuJacobians imu_jacobians(const Preintegration& imu, const FrameState& from,
   out.from.block<3, 6>(kSpeed, kGyroBias) = -J.block<3, 6>(kSpeed, 0);
   out.to.block<3, 3>(kSpeed, kVelocity) = to_body;
 
-  out.from.block<3, 3>(kWay, kRotation) = so3::hat(
-      to_body * (to.p_OB - from.p_OB - dt * from.v_OB - 0.5 * dt * dt * gravity()));
+  out.from.block<3, 3>(kWay, kRotation) =
+      so3::hat(to_body * (to.p_OB - from.p_OB - dt * from.v_OB - 0.5 * dt * dt * gravity()));
   out.from.block<3, 3>(kWay, kPosition) = -to_body;
   out.from.block<3, 3>(kWay, kVelocity) = -dt * to_body;
   out.from.block<3, 6>(kWay, kGyroBias) = -J.block<3, 6>(kWay, 0);
@@ -113,8 +113,9 @@ ImuJacobian imu_whitening(const Preintegration& imu) {
   const double root_s = std::sqrt(std::max(imu.dt_s(), 1e-6));
   W.diagonal().segment<3>(kGyroWalk).setConstant(
       1 / std::max(imu.noise().gyro_walk_density * root_s, 1e-9));
-  W.diagonal().segment<3>(kAccelWalk).setConstant(
-      1 / std::max(imu.noise().accel_walk_density * root_s, 1e-9));
+  W.diagonal()
+      .segment<3>(kAccelWalk)
+      .setConstant(1 / std::max(imu.noise().accel_walk_density * root_s, 1e-9));
   return W;
 }
 
@@ -127,9 +128,8 @@ Exposure::Exposure(const FrameState& x, const FrameTiming& timing, double t_d)
   p_OB += late_s * v_OB;
 }
 
-std::optional<Vec2> sight_residual(const Sight& sight, const Exposure& anchor,
-                                   const Exposure& seen, const CameraState& camera,
-                                   const LandmarkState& landmark) {
+std::optional<Vec2> sight_residual(const Sight& sight, const Exposure& anchor, const Exposure& seen,
+                                   const CameraState& camera, const LandmarkState& landmark) {
   const Vec2& z = sight.right ? *sight.seen.right : sight.seen.left;
   if (sight.own) {
     const double disparity = sight.right ? landmark.inverse_depth * sight.baseline_m : 0;
@@ -144,7 +144,8 @@ SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor, const
                                const CameraState& camera, const LandmarkState& landmark) {
   SightJacobians J;
   if (sight.own) {
-    J.landmark << Eigen::Matrix2d::Identity(), (sight.right ? -sight.baseline_m : 0.0) * Vec2::UnitX();
+    J.landmark << Eigen::Matrix2d::Identity(),
+        (sight.right ? -sight.baseline_m : 0.0) * Vec2::UnitX();
     return J;
   }
   const double rho = landmark.inverse_depth;
@@ -164,9 +165,9 @@ SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor, const
   J.seen << by_seen * seen.turn, -rho * by_O;
   J.camera << D * so3::hat(path.in_Cj) - by_ray * so3::hat(path.ray), rho * (by_Bi - by_Bj),
       by_anchor * anchor.rate + by_seen * seen.rate + rho * by_O * (anchor.v_OB - seen.v_OB);
-  J.landmark << by_ray.leftCols<2>(),
-      by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) - by_Bj * camera.X_BC.p -
-          (sight.right ? sight.baseline_m : 0.0) * D.col(0);
+  J.landmark << by_ray.leftCols<2>(), by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) -
+                                          by_Bj * camera.X_BC.p -
+                                          (sight.right ? sight.baseline_m : 0.0) * D.col(0);
   return J;
 }
 

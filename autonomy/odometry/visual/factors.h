@@ -47,7 +47,7 @@ struct Exposure {
 /// One eye's view of a landmark.
 struct Sight {
   const Observation& seen;
-  bool own = false;    ///< by the frame whose ray the landmark lies on
+  bool own = false;  ///< by the frame whose ray the landmark lies on
   bool right = false;
   double baseline_m = 0;
 };

@@ -13,13 +13,9 @@ namespace {
 
 using Pyramid = std::vector<cv::Mat>;
 
-cv::Point2f to_cv(const Vec2& p) {
-  return {static_cast<float>(p.x()), static_cast<float>(p.y())};
-}
+cv::Point2f to_cv(const Vec2& p) { return {static_cast<float>(p.x()), static_cast<float>(p.y())}; }
 
-Vec2 from_cv(const cv::Point2f& p) {
-  return {static_cast<double>(p.x), static_cast<double>(p.y)};
-}
+Vec2 from_cv(const cv::Point2f& p) { return {static_cast<double>(p.x), static_cast<double>(p.y)}; }
 
 cv::Mat view(const std::vector<std::uint8_t>& pixels, int width, int height) {
   // OpenCV has no constant view; nothing is written through it.
@@ -121,8 +117,8 @@ std::vector<std::optional<Vec2>> FeatureTracker::Impl::follow(
   for (const Vec2& p : points) begin.push_back(to_cv(p));
   for (const Vec2& p : guesses) there.push_back(to_cv(p));
   const cv::Size patch(config.patch_px, config.patch_px);
-  const cv::TermCriteria enough(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
-                                config.iterations, 0.01);
+  const cv::TermCriteria enough(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, config.iterations,
+                                0.01);
   std::vector<std::uint8_t> forward, backward;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(from, to, begin, there, forward, error, patch, config.pyramid_levels,

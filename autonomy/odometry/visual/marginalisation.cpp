@@ -37,8 +37,7 @@ LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
     }
   }
   const ReducedEquations reduced = reduce(equations, 0);
-  const Eigen::MatrixXd H =
-      reduced.H.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
+  const Eigen::MatrixXd H = reduced.H.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
   const LinearRows root = square_root(H, reduced.g.head(n));
   LinearRows rows{Eigen::MatrixXd::Zero(root.J.rows(), layout.size()), root.r};
   rows.J.leftCols(n) = root.J;
@@ -52,9 +51,9 @@ double inverse_depth_from(const Window& window, const Landmark& landmark, const 
     const FrameState& x = window.frames[static_cast<std::size_t>(window.slot(o.frame))].state;
     return Pose{x.R_OB, x.p_OB} * window.camera.X_BC;
   };
-  const Vec3 p = pose(seen).inverse() *
-                 (pose(anchor) * Vec3(landmark.state.ray.homogeneous() /
-                                          landmark.state.inverse_depth));
+  const Vec3 p =
+      pose(seen).inverse() *
+      (pose(anchor) * Vec3(landmark.state.ray.homogeneous() / landmark.state.inverse_depth));
   constexpr double kNearest = 0.1;  // m
   return p.z() > kNearest ? 1 / p.z() : 0;
 }
@@ -107,8 +106,7 @@ LinearRows eliminate(const LinearRows& rows, const std::vector<int>& gone,
   const Eigen::MatrixXd R = qr.matrixQR().triangularView<Eigen::Upper>();
   out.J = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(kept.size()));
   for (std::size_t j = 0; j < places.size(); ++j) {
-    out.J.col(places[j]) =
-        R.block(first_kept, first_kept + static_cast<Eigen::Index>(j), count, 1);
+    out.J.col(places[j]) = R.block(first_kept, first_kept + static_cast<Eigen::Index>(j), count, 1);
   }
   out.r = R.block(first_kept, n, count, 1);
   return out;
@@ -121,11 +119,9 @@ LinearRows square_root(const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
   const Eigen::VectorXd D = ldlt.vectorD();
   const double least = kNothing * std::max(D.maxCoeff(), 1e-300);
   const Eigen::MatrixXd L = ldlt.matrixL();
-  const Eigen::MatrixXd P =
-      ldlt.transpositionsP() * Eigen::MatrixXd::Identity(H.rows(), H.cols());
+  const Eigen::MatrixXd P = ldlt.transpositionsP() * Eigen::MatrixXd::Identity(H.rows(), H.cols());
   const Eigen::MatrixXd LtP = L.transpose() * P;
-  const Eigen::VectorXd y = L.triangularView<Eigen::UnitLower>().solve(
-      Eigen::VectorXd(P * g));
+  const Eigen::VectorXd y = L.triangularView<Eigen::UnitLower>().solve(Eigen::VectorXd(P * g));
   LinearRows out{Eigen::MatrixXd(H.rows(), H.cols()), Eigen::VectorXd(H.rows())};
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < D.size(); ++i) {

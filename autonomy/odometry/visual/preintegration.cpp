@@ -44,9 +44,9 @@ void Preintegration::add(const ImuInterval& imu) {
   Eigen::Matrix<double, 6, 1> variance;  // of the interval's mean readings
   for (int axis = 0; axis < 3; ++axis) {
     const bool clipped = imu.gyro_clipped[static_cast<std::size_t>(axis)];
-    const double density = std::hypot(
-        clipped ? noise_.clipped_gyro_noise_density : noise_.gyro_noise_density,
-        noise_.gyro_scale_noise_density * rate[axis]);
+    const double density =
+        std::hypot(clipped ? noise_.clipped_gyro_noise_density : noise_.gyro_noise_density,
+                   noise_.gyro_scale_noise_density * rate[axis]);
     variance[axis] = density * density / h;
     variance[3 + axis] = noise_.accel_noise_density * noise_.accel_noise_density / h;
   }

@@ -8,8 +8,8 @@
 
 namespace arex {
 
-/// What the IMU says of the motion between two frames, whatever the state at the first: turn, change
-/// of velocity and of position in the body's frame there, gravity left out.
+/// What the IMU says of the motion between two frames, whatever the state at the first: turn,
+/// change of velocity and of position in the body's frame there, gravity left out.
 ///
 /// Error [rotation, velocity, position], 9x1, rotation on the right. Sources: Forster et al., T-RO
 /// 2017, for the errors on the manifold; Qin et al., T-RO 2018, for the midpoint.

@@ -66,7 +66,8 @@ void SlidingWindow::start(const WindowStart& start, const CameraState& camera,
   window_ = {};
   dropped_imu_.reset();
   window_.camera = camera;
-  window_.frames.push_back({next_number_++, features.stamp, {camera.t_d, Vec3::Zero()}, true, start.state, {}});
+  window_.frames.push_back(
+      {next_number_++, features.stamp, {camera.t_d, Vec3::Zero()}, true, start.state, {}});
   window_.prior = {{start.state}, camera, start_rows(start, camera_std)};
   WindowUpdate update;
   observe(features, update);
@@ -161,8 +162,8 @@ bool SlidingWindow::is_keyframe(const WindowUpdate& update) const {
     const Observation& before = landmark.seen[landmark.seen.size() - 2];
     if (before.frame != last.number) continue;
     ++common;
-    parallax += (landmark.seen.back().left -
-                 Vec3(turn * before.left.homogeneous()).hnormalized()).norm();
+    parallax +=
+        (landmark.seen.back().left - Vec3(turn * before.left.homogeneous()).hnormalized()).norm();
   }
   if (seen < kLeastOfKeyframe) return false;
   return update.tracked < config_.keyframe_tracked || 2 * common < seen ||

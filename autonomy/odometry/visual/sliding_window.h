@@ -28,10 +28,10 @@ struct WindowStart {
 
 /// What a frame did to the window.
 struct WindowUpdate {
-  int tracked = 0;              ///< landmarks of known depth that the frame sees, outliers left out
-  int fresh = 0;                ///< features that no earlier frame saw
-  double innovation_px = 0;     ///< median distance of landmarks from where the IMU puts them
-  double correction_m = 0;      ///< of the newest position against the IMU's
+  int tracked = 0;           ///< landmarks of known depth that the frame sees, outliers left out
+  int fresh = 0;             ///< features that no earlier frame saw
+  double innovation_px = 0;  ///< median distance of landmarks from where the IMU puts them
+  double correction_m = 0;   ///< of the newest position against the IMU's
   bool keyframe = false;
   SolveReport solve;
   std::vector<std::int64_t> outliers;  ///< landmarks dropped: not worth following on

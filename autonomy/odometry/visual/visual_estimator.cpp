@@ -51,8 +51,7 @@ Mat3 VisualEstimator::camera_turn(Stamp from, Stamp to) const {
 Preintegration VisualEstimator::integrate(Stamp to, double t_d) const {
   Preintegration imu(config_.imu, state_.b_g, state_.b_a);
   const Stamp begin = stamp_ + from_seconds(placed_by_), end = to + from_seconds(t_d);
-  for (const ImuInterval& interval :
-       imu_intervals(imu_.samples(), begin, end, accel_scale_)) {
+  for (const ImuInterval& interval : imu_intervals(imu_.samples(), begin, end, accel_scale_)) {
     imu.add(interval);
   }
   const WhiteNoise shaking = white_noise(imu_.between(end - kShakenFor, end));
@@ -108,10 +107,10 @@ void VisualEstimator::try_start(const FeatureFrame& features, VisualUpdate& upda
   const Stamp until = features.stamp + from_seconds(nominal_.t_d);
   const std::span<const ImuSample> samples = imu_.until(until);
   const StaticInitialiserConfig& still = config_.initialiser;
-  update.need = has_imu_gap(samples, until) ? OdometryNeed::kImu : missing_for_start(samples, still);
-  const auto standing = update.need == OdometryNeed::kNothing
-                            ? measure_standstill(samples, still)
-                            : std::nullopt;
+  update.need =
+      has_imu_gap(samples, until) ? OdometryNeed::kImu : missing_for_start(samples, still);
+  const auto standing =
+      update.need == OdometryNeed::kNothing ? measure_standstill(samples, still) : std::nullopt;
   if (standing && seen_by_both(features) < config_.health.restart_tracks) {
     update.need = features.features.empty() ? OdometryNeed::kImages : OdometryNeed::kFeatures;
   }
@@ -123,7 +122,8 @@ void VisualEstimator::try_start(const FeatureFrame& features, VisualUpdate& upda
   WindowStart start;
   start.state.R_OB = level(standing->moments.accel_mean);
   start.state.b_g = standing->moments.gyro_mean;
-  const double mean_std = standing->moments.gyro_std / std::sqrt(static_cast<double>(standing->samples));
+  const double mean_std =
+      standing->moments.gyro_std / std::sqrt(static_cast<double>(standing->samples));
   start.gyro_bias_std_radps = std::hypot(still.gyro_bias_std_radps, mean_std);
   start.accel_bias_std_mps2 = still.accel_bias_std_mps2;
   start.rest_force_std_mps2 = still.gravity_std_mps2;
@@ -247,7 +247,8 @@ void VisualEstimator::watch_camera(VisualUpdate& update) {
   const double angle = off.head<3>().norm();
   if (!mount_told_ && sure(angle, health.mount_rad, P.topLeftCorner<3, 3>().trace())) {
     mount_told_ = true;
-    update.faults.push_back(fmt::format("camera mount turned {:.1f} deg", angle * 180 / std::numbers::pi));
+    update.faults.push_back(
+        fmt::format("camera mount turned {:.1f} deg", angle * 180 / std::numbers::pi));
   }
 }
 

@@ -21,7 +21,7 @@ struct VisualUpdate {
   Stamp correction_stamp = 0;  ///< of the newest that corrected the estimate
   OdometryStatus status = OdometryStatus::kInitialising;
   OdometryNeed need = OdometryNeed::kNothing;
-  NavigationState state;       ///< its t_d is the camera's: see CameraState
+  NavigationState state;  ///< its t_d is the camera's: see CameraState
   double accel_scale = 1;
   /// Of [rotation, position, velocity, b_g, b_a].
   Eigen::Matrix<double, kFrameDim, kFrameDim> covariance =

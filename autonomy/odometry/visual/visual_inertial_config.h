@@ -6,8 +6,8 @@
 /// al., T-RO 2018, its EuRoC settings), Basalt (Usenko et al., RA-L 2020).
 namespace arex {
 
-/// What the estimator believes of the pair beside what each image says of it. Where the left eye sits
-/// stands under `vehicle`.
+/// What the estimator believes of the pair beside what each image says of it. Where the left eye
+/// sits stands under `vehicle`.
 struct StereoCalibrationConfig {
   double clock_offset_s = 0;
   double clock_offset_std_s = 0.01;

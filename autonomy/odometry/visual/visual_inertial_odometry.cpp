@@ -5,8 +5,8 @@
 
 namespace arex {
 
-VisualInertialOdometry::VisualInertialOdometry(const VisualInertialConfig& config,
-                                               const Pose& X_BC, std::uint64_t seed)
+VisualInertialOdometry::VisualInertialOdometry(const VisualInertialConfig& config, const Pose& X_BC,
+                                               std::uint64_t seed)
     : health_(config.health),
       imu_delay_s_(config.imu.delay_s),
       tracker_(config.tracker, seed),
@@ -71,8 +71,7 @@ void VisualInertialOdometry::publish() {
   odometry_.w_OB_B = state->rate(newest_.gyro_radps);
   odometry_.covariance = covariance_at(odometry_.stamp + camera_ahead);
   // The images may have stopped, too.
-  const double silence_s =
-      to_seconds(odometry_.stamp + camera_ahead - odometry_.correction_stamp);
+  const double silence_s = to_seconds(odometry_.stamp + camera_ahead - odometry_.correction_stamp);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
   } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {

@@ -38,12 +38,12 @@ struct LinearRows {
 struct WindowPrior {
   std::vector<FrameState> frames;  ///< the first estimates, of the window's first frames
   CameraState camera;
-  LinearRows rows;                 ///< columns: WindowLayout of these frames
+  LinearRows rows;  ///< columns: WindowLayout of these frames
 };
 
 struct WindowFrame {
   std::int64_t number = 0;
-  Stamp stamp = 0;    ///< by the camera's clock
+  Stamp stamp = 0;     ///< by the camera's clock
   FrameTiming timing;  ///< the IMU's stamp is stamp + timing.placed_by
   bool keyframe = false;
   FrameState state;

@@ -75,7 +75,8 @@ Undo apply(Window& window, const NormalEquations& equations, const WindowStep& s
   for (std::size_t l = 0; l < equations.terms.size(); ++l) {
     LandmarkState& state = equations.terms[l].landmark->state;
     undo.landmarks.push_back(state);
-    const Vec3 d = step.landmarks.segment<kLandmarkDim>(kLandmarkDim * static_cast<Eigen::Index>(l));
+    const Vec3 d =
+        step.landmarks.segment<kLandmarkDim>(kLandmarkDim * static_cast<Eigen::Index>(l));
     state.ray += d.head<2>();
     state.inverse_depth = std::max(state.inverse_depth + d.z(), 1 / kFurthest);
   }
@@ -179,8 +180,8 @@ void add_landmark(const Window& window, const WindowExposures& exposures, Landma
   Eigen::Matrix<double, Eigen::Dynamic, kLandmarkDim> W =
       Eigen::MatrixXd::Zero(layout.visual_size(), kLandmarkDim);
   const auto visit = [&](const Sight& sight, std::size_t a, std::size_t s) {
-    const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s], window.camera,
-                                         landmark.state);
+    const auto residual =
+        sight_residual(sight, exposures.now[a], exposures.now[s], window.camera, landmark.state);
     if (!residual) return;
     const Robust robust = huber(scale * residual->norm(), noise.huber_sigma);
     out.cost += robust.cost;
@@ -259,8 +260,7 @@ WindowStep solve(const NormalEquations& equations, double lambda) {
   WindowStep step;
   step.states = -reduced.H.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
   const Eigen::Index columns = kLandmarkDim * static_cast<Eigen::Index>(equations.terms.size());
-  step.landmarks =
-      equations.W.leftCols(columns).transpose() * step.states.head(equations.W.rows());
+  step.landmarks = equations.W.leftCols(columns).transpose() * step.states.head(equations.W.rows());
   Eigen::Index column = 0;
   for (const auto& term : equations.terms) {
     Mat3 damped = term.H;
@@ -319,13 +319,14 @@ std::optional<double> mean_residual(const Window& window, const WindowExposures&
   double sum = 0;
   int count = 0;
   bool behind = false;
-  for_each_sight(window, landmark, noise, -1, [&](const Sight& sight, std::size_t a, std::size_t s) {
-    const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s], window.camera,
-                                         landmark.state);
-    behind |= !residual;
-    if (residual) sum += residual->norm() / noise.ray_std;
-    ++count;
-  });
+  for_each_sight(window, landmark, noise, -1,
+                 [&](const Sight& sight, std::size_t a, std::size_t s) {
+                   const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s],
+                                                        window.camera, landmark.state);
+                   behind |= !residual;
+                   if (residual) sum += residual->norm() / noise.ray_std;
+                   ++count;
+                 });
   if (behind || count == 0) return std::nullopt;
   return sum / count;
 }

@@ -17,9 +17,9 @@ struct NormalEquations {
     Mat3 H = Mat3::Zero();
     Vec3 g = Vec3::Zero();
   };
-  Eigen::MatrixXd H;               ///< lower triangle, WindowLayout
+  Eigen::MatrixXd H;  ///< lower triangle, WindowLayout
   Eigen::VectorXd g;
-  Eigen::MatrixXd W;               ///< how landmarks hang on poses and camera: three columns each
+  Eigen::MatrixXd W;  ///< how landmarks hang on poses and camera: three columns each
   std::vector<LandmarkTerm> terms;
   double cost = 0;
 };

@@ -23,7 +23,7 @@ struct TrackedFeature {
 
 /// What the front end makes of one exposure, in order of id.
 struct FeatureFrame {
-  Stamp stamp = 0;  ///< by the camera's clock
+  Stamp stamp = 0;                                ///< by the camera's clock
   double f_px = StereoCamera{}.f_px;              ///< of the eyes: what a pixel is
   double baseline_m = StereoCamera{}.baseline_m;  ///< from the left eye to the right
   std::vector<TrackedFeature> features;
@@ -78,8 +78,8 @@ inline CameraError local(const CameraState& x, const CameraState& y) {
 
 /// Where a landmark was seen in one frame.
 struct Observation {
-  std::int64_t frame = 0;          ///< its number
-  Vec2 left = Vec2::Zero();        ///< normalised coordinates
+  std::int64_t frame = 0;    ///< its number
+  Vec2 left = Vec2::Zero();  ///< normalised coordinates
   std::optional<Vec2> right;
 };
 

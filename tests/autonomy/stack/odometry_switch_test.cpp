@@ -50,7 +50,8 @@ Flight fly(const Source& first, const Source& second, bool lost_at_once) {
     Odometry a = first.at(now);
     if (silent) {
       const double lost_s = to_seconds(now) - 20;
-      a = first.at(now, lost_at_once || lost_s > 3 ? OdometryStatus::kLost : OdometryStatus::kDegenerate,
+      a = first.at(now,
+                   lost_at_once || lost_s > 3 ? OdometryStatus::kLost : OdometryStatus::kDegenerate,
                    from_seconds(20));
       a.X_OB.p += 0.02 * lost_s * lost_s * Vec3::UnitX();  // on the IMU alone
     }
@@ -72,8 +73,7 @@ TEST(OdometrySwitch, HandsOverAndBackWithoutAStep) {
     EXPECT_NEAR(to_seconds(flight.changes[1].first), 42, 0.02);
     for (std::size_t i = 1; i < flight.seen.size(); ++i) {
       const Odometry &before = flight.seen[i - 1], &now = flight.seen[i];
-      const double step =
-          (now.X_OB.p - before.X_OB.p - to_seconds(kStep) * before.v_OB).norm();
+      const double step = (now.X_OB.p - before.X_OB.p - to_seconds(kStep) * before.v_OB).norm();
       EXPECT_LT(step, 0.002) << to_seconds(now.stamp);
       EXPECT_LT(so3::angle(before.X_OB.R.transpose() * now.X_OB.R), 0.002);
     }

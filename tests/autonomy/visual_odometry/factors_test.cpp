@@ -115,9 +115,8 @@ TEST(SightFactor, DerivativesAreThoseOfTheResidual) {
                          const LandmarkState& point) {
         return *sight_residual(sight, {a, s.of_a, c.t_d}, {b, s.of_b, c.t_d}, c, point);
       };
-      const SightJacobians J =
-          sight_jacobians(sight, {s.a, s.of_a, s.camera.t_d}, {s.b, s.of_b, s.camera.t_d},
-                          s.camera, s.point);
+      const SightJacobians J = sight_jacobians(sight, {s.a, s.of_a, s.camera.t_d},
+                                               {s.b, s.of_b, s.camera.t_d}, s.camera, s.point);
       for (int i = 0; i < kPoseDim; ++i) {
         const Vec2 by_a = (r(retract(s.a, unit(i, h)), s.b, s.camera, s.point) -
                            r(retract(s.a, unit(i, -h)), s.b, s.camera, s.point)) /
@@ -166,8 +165,8 @@ TEST(SightFactor, RefusesWhatLiesBehindTheCamera) {
   FrameState turned = s.b;
   turned.R_OB = s.a.R_OB * so3::from_yaw(3.0);
   const Sight sight{s.seen, false, false, 0.05};
-  EXPECT_FALSE(sight_residual(sight, {s.a, s.of_a, s.camera.t_d},
-                              {turned, s.of_b, s.camera.t_d}, s.camera, s.point));
+  EXPECT_FALSE(sight_residual(sight, {s.a, s.of_a, s.camera.t_d}, {turned, s.of_b, s.camera.t_d},
+                              s.camera, s.point));
 }
 
 /// A landmark as both frames of the scene see it.

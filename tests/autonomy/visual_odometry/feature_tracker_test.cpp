@@ -27,8 +27,8 @@ double texture(double x, double y) {
     const auto at = [&](int di, int dj) {
       return lattice(static_cast<std::int64_t>(i) + di, static_cast<std::int64_t>(j) + dj, octave);
     };
-    const double value = (1 - b) * ((1 - a) * at(0, 0) + a * at(1, 0)) +
-                         b * ((1 - a) * at(0, 1) + a * at(1, 1));
+    const double value =
+        (1 - b) * ((1 - a) * at(0, 0) + a * at(1, 0)) + b * ((1 - a) * at(0, 1) + a * at(1, 1));
     grey += height * (value - 0.5) * 2;
   }
   return grey;
@@ -68,8 +68,7 @@ StereoImage poster(std::int64_t time_ns, const Vec2& shift, double disparity_px)
   image.height = kHeight;
   image.camera = small_camera();
   image.left = picture([&](const Vec2& px) { return Vec2(px - shift); });
-  image.right =
-      picture([&](const Vec2& px) { return Vec2(px - shift + Vec2(disparity_px, 0)); });
+  image.right = picture([&](const Vec2& px) { return Vec2(px - shift + Vec2(disparity_px, 0)); });
   return image;
 }
 
@@ -116,8 +115,8 @@ TEST(FeatureTracker, IsHeldInAFastTurnByTheGyro) {
   const auto turned = [&] {
     StereoImage image = poster(100, {0, 0}, 6);
     const auto place = [&](const Vec2& px) {
-      const Vec3 ray = turn * Vec3((px.x() - camera.cx) / camera.f_px,
-                                   (px.y() - camera.cy) / camera.f_px, 1);
+      const Vec3 ray =
+          turn * Vec3((px.x() - camera.cx) / camera.f_px, (px.y() - camera.cy) / camera.f_px, 1);
       return Vec2(camera.f_px * ray.x() / ray.z() + camera.cx,
                   camera.f_px * ray.y() / ray.z() + camera.cy);
     };

@@ -58,7 +58,8 @@ class Eyes {
     choose(visible);
     FeatureFrame frame;
     frame.stamp = stamp;
-    for (const auto& [point, id] : followed_) frame.features.push_back(seen(id, visible.at(point), right));
+    for (const auto& [point, id] : followed_)
+      frame.features.push_back(seen(id, visible.at(point), right));
     std::sort(frame.features.begin(), frame.features.end(),
               [](const TrackedFeature& a, const TrackedFeature& b) { return a.id < b.id; });
     return frame;
@@ -80,7 +81,8 @@ class Eyes {
     std::erase_if(followed_, [&](const auto& f) { return !visible.contains(f.first); });
     std::map<int, int> count;
     const auto cell_of = [](const Projection& p) {
-      return static_cast<int>(p.left_px.y()) / kCell * 100 + static_cast<int>(p.left_px.x()) / kCell;
+      return static_cast<int>(p.left_px.y()) / kCell * 100 +
+             static_cast<int>(p.left_px.x()) / kCell;
     };
     for (const auto& [point, id] : followed_) ++count[cell_of(visible.at(point))];
     constexpr int kShare = 2;
@@ -130,8 +132,8 @@ SyntheticFlight synthesise(const SyntheticConfig& config) {
   Vec3 last = flight.motion.at(0).X_OB.p;
   for (Stamp t = period; t <= end; t += period, ++exposure) {
     const MotionState truth = flight.motion.at(to_seconds(t));
-    flight.frames.push_back(eyes.expose(truth.X_OB, t + flight.clock_offset,
-                                        exposure % config.right_every == 0));
+    flight.frames.push_back(
+        eyes.expose(truth.X_OB, t + flight.clock_offset, exposure % config.right_every == 0));
     flight.path_m += (truth.X_OB.p - last).norm();
     last = truth.X_OB.p;
   }
@@ -162,14 +164,14 @@ SyntheticRun fly(const SyntheticFlight& flight, const VisualInertialConfig& conf
       if (tamper) tamper(frame);
       pending.push_back(odometry.correct(frame, std::exchange(unhanded, {})));
     }
-    while (!pending.empty() && sample.stamp >= pending.front().stamp - flight.clock_offset +
-                                                   from_seconds(latency_s)) {
+    while (!pending.empty() &&
+           sample.stamp >= pending.front().stamp - flight.clock_offset + from_seconds(latency_s)) {
       const Odometry before = odometry.odometry();
       odometry.apply(pending.front());
       const VisualUpdate& update = pending.front();
       if (before.status != OdometryStatus::kInitialising) {
-        run.largest_step_m = std::max(
-            run.largest_step_m, (odometry.odometry().X_OB.p - before.X_OB.p).norm());
+        run.largest_step_m =
+            std::max(run.largest_step_m, (odometry.odometry().X_OB.p - before.X_OB.p).norm());
       }
       run.faults.insert(run.faults.end(), update.faults.begin(), update.faults.end());
       run.updates.push_back(update);
@@ -185,8 +187,8 @@ SyntheticRun fly(const SyntheticFlight& flight, const VisualInertialConfig& conf
     ++started;
     run.end_m = error.norm();
     run.worst_m = std::max(run.worst_m, run.end_m);
-    run.worst_yaw_rad = std::max(run.worst_yaw_rad,
-                                 std::abs(so3::wrap(so3::yaw(now.X_OB.R) - so3::yaw(truth.R))));
+    run.worst_yaw_rad =
+        std::max(run.worst_yaw_rad, std::abs(so3::wrap(so3::yaw(now.X_OB.R) - so3::yaw(truth.R))));
     constexpr double kMoved = 0.5;  // m
     if (truth.p.norm() < kMoved) continue;
     nees += error.dot(now.covariance.bottomRightCorner<3, 3>().ldlt().solve(error));

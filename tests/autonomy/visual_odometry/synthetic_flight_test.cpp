@@ -74,7 +74,9 @@ TEST(SyntheticFlight, IsAccurateAndConsistentAtAPixel) {
   EXPECT_LT(mean.nees, 10);
 }
 
-TEST(SyntheticFlight, StaysRegularWithoutFirstEstimates) { EXPECT_LT(mean_of(0.1, false).nees, 30); }
+TEST(SyntheticFlight, StaysRegularWithoutFirstEstimates) {
+  EXPECT_LT(mean_of(0.1, false).nees, 30);
+}
 
 TEST(SyntheticFlight, NeedsTheRightEyeOnEveryFourthImageOnly) {
   SyntheticConfig config = noisy(0.3, 4);

@@ -41,9 +41,8 @@ bool told(const SyntheticRun& run, const std::string& what) {
 }
 
 int count(const SyntheticRun& run, OdometryStatus status) {
-  return static_cast<int>(std::count_if(run.fast.begin(), run.fast.end(), [&](const Odometry& o) {
-    return o.status == status;
-  }));
+  return static_cast<int>(std::count_if(run.fast.begin(), run.fast.end(),
+                                        [&](const Odometry& o) { return o.status == status; }));
 }
 
 TEST(VisualHealth, OutlivesABlackoutWithoutBeingLost) {
@@ -60,9 +59,10 @@ TEST(VisualHealth, OutlivesABlackoutWithoutBeingLost) {
 TEST(VisualHealth, IsDegenerateThenLostInTheDarkAndBeginsAnewInTheLight) {
   const SyntheticRun run = fly(flight(), config(), dark(20, 32));
   const auto first = [&](OdometryStatus status) {
-    return std::find_if(run.fast.begin(), run.fast.end(), [&](const Odometry& o) {
-             return o.stamp > from_seconds(20) && o.status == status;
-           })->stamp;
+    return std::find_if(
+               run.fast.begin(), run.fast.end(),
+               [&](const Odometry& o) { return o.stamp > from_seconds(20) && o.status == status; })
+        ->stamp;
   };
   EXPECT_LT(first(OdometryStatus::kDegenerate), from_seconds(21));
   EXPECT_LT(first(OdometryStatus::kLost), from_seconds(29));

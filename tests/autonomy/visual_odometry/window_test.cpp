@@ -42,7 +42,10 @@ Window make_window(std::uint64_t seed, int frames, bool newest_too = true) {
     frame.stamp = stamp;
     frame.keyframe = true;
     frame.state = {x.X_OB.R * so3::Exp(0.003 * random.normal3()),
-                   x.X_OB.p + 0.01 * random.normal3(), x.v_OB + 0.02 * random.normal3(), {}, {}};
+                   x.X_OB.p + 0.01 * random.normal3(),
+                   x.v_OB + 0.02 * random.normal3(),
+                   {},
+                   {}};
     frame.state.b_g.setZero();
     frame.state.b_a.setZero();
     if (k > 0) {

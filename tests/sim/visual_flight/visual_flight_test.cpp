@@ -12,8 +12,8 @@ namespace {
 
 struct Flown {
   FlightResult result;
-  std::string events;           ///< events.csv
-  double largest_step_m = 0;    ///< of what the controller sees, beyond its velocity, from take-off
+  std::string events;         ///< events.csv
+  double largest_step_m = 0;  ///< of what the controller sees, beyond its velocity, from take-off
   double largest_turn_rad = 0;
 };
 
@@ -32,8 +32,8 @@ Flown fly(const std::string& scenario, const std::vector<std::string>& overrides
     const Odometry& now = view.odometry;
     if (now.stamp > before.stamp && before.status != OdometryStatus::kInitialising) {
       const double dt = to_seconds(now.stamp - before.stamp);
-      flown.largest_step_m = std::max(
-          flown.largest_step_m, (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm());
+      flown.largest_step_m =
+          std::max(flown.largest_step_m, (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm());
       const Mat3 turned = before.X_OB.R * so3::Exp(dt * before.w_OB_B);
       flown.largest_turn_rad =
           std::max(flown.largest_turn_rad, so3::angle(turned.transpose() * now.X_OB.R));
@@ -67,10 +67,9 @@ TEST(VisualFlight, DriftsBesideALidarThatDoesNot) {
 
 // The LiDAR is silent for 20 s in the middle of an exploration, which goes on.
 TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
-  const Flown flown =
-      fly("forest_small", {"odometry.failover=[lidar_inertial, visual_inertial]",
-                           "lidar.fault_silent_from_s=20", "lidar.fault_silent_for_s=20",
-                           "mission.max_time_s=60"});
+  const Flown flown = fly("forest_small", {"odometry.failover=[lidar_inertial, visual_inertial]",
+                                           "lidar.fault_silent_from_s=20",
+                                           "lidar.fault_silent_for_s=20", "mission.max_time_s=60"});
   EXPECT_EQ(flown.result.outcome, Outcome::kTimedOut) << flown.result.reason;
   EXPECT_EQ(flown.result.flight.odometry_lost_s, 0);
   EXPECT_NE(flown.events.find("odometry visual_inertial takes over from lidar_inertial"),
@@ -83,9 +82,9 @@ TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
 
 // At the bottom of the ramp there is no light at all.
 TEST(VisualFlight, SaysThatItSeesNothingInTheDark) {
-  const Flown flown = fly("garage_waypoints",
-                          {"odometries={vio: {type: visual_inertial}}",
-                           "infrared.light.lamps=false", "mission.max_time_s=55"});
+  const Flown flown =
+      fly("garage_waypoints", {"odometries={vio: {type: visual_inertial}}",
+                               "infrared.light.lamps=false", "mission.max_time_s=55"});
   EXPECT_NE(flown.events.find("sensor_fault,visual odometry degenerate: few tracks"),
             std::string::npos);
   EXPECT_NE(flown.events.find("sensor_fault,visual odometry lost"), std::string::npos);

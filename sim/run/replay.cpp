@@ -261,10 +261,15 @@ ReplayResult Replay::finish(const std::vector<StampedPose>& truth) {
 
 void prepare_for_replay(Scenario& scenario, const ReplayInput& input) {
   StackConfig& stack = scenario.config.stack;
-  if (stack.uses_odometry("mocap")) {
-    throw ConfigError(
-        "arex replay: the configuration asks for the odometry mocap, expected those "
-        "that a recording feeds, such as odometry.source: lidar_inertial");
+  const auto further = stack.odometries.find(stack.odometry.source);
+  const std::string& flies =
+      further == stack.odometries.end() ? stack.odometry.source : further->second.type;
+  // Images are not read from recordings: one that runs beside stays silent.
+  if (stack.uses_odometry("mocap") || flies == kVisualInertial) {
+    throw ConfigError("arex replay: the configuration asks for the odometry " +
+                      std::string(flies == kVisualInertial ? kVisualInertial : "mocap") +
+                      ", expected those that a recording feeds, such as odometry.source: "
+                      "lidar_inertial");
   }
   if (says_mount(scenario.source)) return;
   if (!input.X_BL()) {

@@ -19,6 +19,7 @@ LidarInertialOdometry::LidarInertialOdometry(const LidarInertialConfig& config, 
 Odometry LidarInertialOdometry::add_imu(const ImuSample& imu) {
   newest_ = imu;
   full_scale_.add(imu.gyro_radps);
+  predictor_.set_gyro_full_scale(full_scale_.radps());
   unhanded_.push_back(imu);
   predictor_.add(unhanded_.back());
   publish();

@@ -182,7 +182,8 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   const Vec3 clipped_s = clipped_time(scan).seconds;
   const bool clipped = clipped_s.maxCoeff() > 0;
   const ErrorStateFilter before = filter_;
-  if (clipped && status_ != OdometryStatus::kLost) {
+  const bool by_scan = clipped && !gyro_.by_field();
+  if (by_scan && status_ != OdometryStatus::kLost) {
     gyro_.missing_radps = likeliest_missing(scan, clipped_s);
   }
   Attempt made;
@@ -190,18 +191,34 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
     const GyroCompletion gyro_before = gyro_;
     made = attempt(scan, shaking);
     const double change = (made.missing_radps - gyro_before.missing_radps).norm();
-    if (!clipped || change < kSettled || pass == kPasses) break;
+    if (!by_scan || change < kSettled || pass == kPasses) break;
     filter_ = before;
     gyro_ = gyro_before;
     gyro_.missing_radps = made.missing_radps;
   }
   gyro_.missing_radps = made.missing_radps;
+  stamp_ = middle_of(scan);
+  if (made.registration.accepted) note_field();
   update.registration = std::move(made.registration);
   update.recovered = made.recovered;
   update.gyro_clipped = clipped;
-  stamp_ = middle_of(scan);
   imu_.forget_before(stamp_ - kShakenFor);
   return std::move(made.points);
+}
+
+void ScanCorrector::note_field() {
+  constexpr Stamp kAround = kNanosecondsPerSecond / 100;
+  constexpr double kShare = 0.5;
+  const Stamp at = stamp_ + from_seconds(filter_.state().t_d);
+  Vec3 sum = Vec3::Zero();
+  double n = 0;
+  for (const ImuSample& sample : imu_.between(at - kAround, at + kAround)) {
+    sum += sample.field_gauss;
+    ++n;
+  }
+  if (n == 0 || sum.isZero(0)) return;
+  const Vec3 now = filter_.state().R_OB * (sum / n);
+  gyro_.field_O = gyro_.by_field() ? Vec3(gyro_.field_O + kShare * (now - gyro_.field_O)) : now;
 }
 
 ClippedTime ScanCorrector::clipped_time(const LidarScan& scan) const {
@@ -310,7 +327,7 @@ std::vector<MotionSegment> ScanCorrector::predict_to(Stamp stamp, Stamp scan_len
       imu_intervals(imu_.samples(), stamp_, stamp, accel_scale_, t_d);
   add_slopes(intervals, imu_.samples(), accel_scale_, t_d, scan_length, shaking);
   for (ImuInterval& imu : intervals) {
-    gyro_.complete(imu);
+    gyro_.complete(imu, filter_.state().R_OB);
     clipped.add(imu, gyro_.full_scale_radps);
     segments.push_back(motion_segment(filter_.state(), imu));
     filter_.predict(imu, stood_at_.has_value());
@@ -323,7 +340,7 @@ std::vector<MotionSegment> ScanCorrector::motion(Stamp from, Stamp to, Navigatio
   std::vector<MotionSegment> segments;
   if (imu_.empty()) return segments;
   for (ImuInterval& imu : imu_intervals(imu_.samples(), from, to, accel_scale_, x.t_d)) {
-    gyro.complete(imu);
+    gyro.complete(imu, x.R_OB);
     segments.push_back(motion_segment(x, imu));
     x = propagate(x, imu);
   }

@@ -72,6 +72,8 @@ class ScanCorrector {
     Vec3 missing_radps = Vec3::Constant(GyroCompletion::kUntold);  ///< by what it found
   };
   Attempt attempt(const LidarScan& scan, const WhiteNoise& shaking);
+  /// Where the earth's field lies in O, by the scan that has just been registered.
+  void note_field();
   [[nodiscard]] ClippedTime clipped_time(const LidarScan& scan) const;
   /// A clipped gyro turns a scan and bends it, so far perhaps that a registration does not find
   /// where it belongs. Both hang on one figure, the rate that is missing: looks for the one with

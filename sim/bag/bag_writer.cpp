@@ -159,12 +159,13 @@ void BagWriter::imu_on(Topic& topic, const ImuSample& sample) {
 
 void BagWriter::imu(const ImuSample& sample) {
   if (sample.stamp < 0) return;  // its clock lags, and the run has just begun
-  imu_on(imu_, sample);
-  imu_on(livox_imu_, sample);
+  // First, so that who reads a sample of the IMU has its field already.
   begin_message(field_, sample.stamp, kBodyFrame);
   message_.put(kTeslaPerGauss * sample.field_gauss);
   put_numbers(covariance<9>());
   write(field_);
+  imu_on(imu_, sample);
+  imu_on(livox_imu_, sample);
 }
 
 void BagWriter::put_point(const LidarPoint& point, Stamp frame_begin) {

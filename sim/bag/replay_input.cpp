@@ -138,11 +138,13 @@ ReplayInput::ReplayInput(const std::filesystem::path& file, const ReplayOptions&
     const RecordedTopic& topic = recording_.topics()[i];
     if (!truth_ && has_poses(topic) && sounds_true(topic.name)) truth_ = i;
     if (topic.type == "sensor_msgs/TimeReference") frame_ends_.push_back(i);
+    if (!magnetometer_ && topic.type == "sensor_msgs/MagneticField") magnetometer_ = i;
     if (topic.type == "tf2_msgs/TFMessage" && topic.name == "/tf_static") transforms_.push_back(i);
   }
   survey();
   std::vector<std::size_t> read{lidar_, imu_};
   read.insert(read.end(), frame_ends_.begin(), frame_ends_.end());
+  if (magnetometer_) read.push_back(*magnetometer_);
   recording_.select(read);
 }
 
@@ -228,22 +230,36 @@ std::optional<Arrival> ReplayInput::next() {
     } else if (message.topic == lidar_) {
       arrival.scan = scan_of(message);
     } else {
-      try {
-        const auto end = decode_frame_end(message.bytes, recording_.topics()[message.topic].format);
-        if (end && end->frame == lidar_frame_) frame_end_ = end;
-      } catch (const DecodeError&) {
-        // Then the frame ends with its last point, as those of others do.
-      }
+      note_other(message);
     }
     if (arrival.imu || arrival.scan) return arrival;
   }
   return std::nullopt;
 }
 
+void ReplayInput::note_other(const RecordedMessage& message) {
+  const WireFormat format = recording_.topics()[message.topic].format;
+  try {
+    if (message.topic == magnetometer_) {
+      DecodedField field = decode_field(message.bytes, format);
+      if (field.frame == imu_frame_) field_ = std::move(field);
+    } else {
+      const auto end = decode_frame_end(message.bytes, format);
+      if (end && end->frame == lidar_frame_) frame_end_ = end;
+    }
+  } catch (const DecodeError&) {
+    // Without a field the IMU has six axes; without its end a frame ends with its last point.
+  }
+}
+
 std::optional<ImuSample> ReplayInput::imu_of(const RecordedMessage& message) {
   try {
     ImuSample sample = decode_imu(message.bytes, recording_.topics()[imu_].format).sample;
     if (!imu_checks_.accept(sample.stamp)) return std::nullopt;
+    constexpr Stamp kSameMoment = kNanosecondsPerSecond / 20;
+    if (field_ && std::abs(sample.stamp - field_->stamp) <= kSameMoment) {
+      sample.field_gauss = field_->gauss;
+    }
     sample.stamp = run_time(sample.stamp);
     // A product with one changes nothing, to the last bit.
     sample.accel_mps2 *= accel_factor_;

@@ -97,6 +97,7 @@ class ReplayInput {
   void survey();
   void find_mount(const std::vector<DecodedTransform>& transforms);
   std::optional<ImuSample> imu_of(const RecordedMessage& message);
+  void note_other(const RecordedMessage& message);
   LidarScanPtr scan_of(const RecordedMessage& message);
   [[nodiscard]] Stamp run_time(Stamp recorded) const;
 
@@ -104,6 +105,7 @@ class ReplayInput {
   ReplayOptions options_;
   std::size_t imu_ = 0, lidar_ = 0;  ///< topics
   std::optional<std::size_t> truth_;
+  std::optional<std::size_t> magnetometer_;
   std::vector<std::size_t> frame_ends_, transforms_;
   ScanDecoder decoder_;
   double accel_factor_ = 1;  ///< to m/s^2
@@ -113,6 +115,7 @@ class ReplayInput {
   Stamp origin_ = 0;
   Stamp clock_shift_ = 0;  ///< of arrivals behind stamps, by the clocks' difference
   std::optional<DecodedFrameEnd> frame_end_;  ///< the newest
+  std::optional<DecodedField> field_;         ///< likewise, in the IMU's frame
   StampChecks imu_checks_, scan_checks_;
 };
 

@@ -170,6 +170,17 @@ DecodedImu decode_imu(std::string_view bytes, WireFormat format) {
   return imu;
 }
 
+DecodedField decode_field(std::string_view bytes, WireFormat format) {
+  constexpr double kGaussPerTesla = 1e4, kMost = 1e3;
+  WireReader reader(bytes, format);
+  const WireHeader header = reader.header();
+  DecodedField field{header.stamp, std::string(header.frame), kGaussPerTesla * reader.vector()};
+  if (!field.gauss.allFinite() || field.gauss.cwiseAbs().maxCoeff() > kMost) {
+    throw DecodeError("a magnetic field that is none");
+  }
+  return field;
+}
+
 bool is_pose_type(std::string_view type) {
   return type == "nav_msgs/Odometry" || type == "geometry_msgs/PoseStamped" ||
          type == "geometry_msgs/PoseWithCovarianceStamped" ||

@@ -19,6 +19,14 @@ struct DecodedImu {
 };
 DecodedImu decode_imu(std::string_view bytes, WireFormat format);
 
+struct DecodedField {
+  Stamp stamp = 0;
+  std::string frame;
+  Vec3 gauss = Vec3::Zero();
+};
+/// A sensor_msgs/MagneticField, which is in tesla.
+DecodedField decode_field(std::string_view bytes, WireFormat format);
+
 struct DecodedPose {
   Stamp stamp = 0;
   Pose X;  ///< of the child in the header's frame

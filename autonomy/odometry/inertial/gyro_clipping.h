@@ -6,7 +6,8 @@
 #include "odometry/inertial/navigation_state.h"
 
 /// A gyro that turns faster than its full scale reads the full scale. The odometry notices it by
-/// the readings alone and lets the scans say what they lack; until one does, the turn is taken to
+/// the readings alone. What they lack the magnetometer says at once, where there is one, by how far
+/// the earth's field has turned; where not, the next scan does, and until then the turn is taken to
 /// go on as it came.
 namespace arex {
 
@@ -17,16 +18,25 @@ struct GyroCompletion {
   double full_scale_radps = 0;
   /// Beyond the full scale, each axis, by the newest scan; kUntold where none has told.
   Vec3 missing_radps = Vec3::Constant(kUntold);
+  /// The earth's field as the last scans leave it, with what a magnetometer adds of its own, gauss;
+  /// zero where there is none.
+  Vec3 field_O = Vec3::Zero();
 
+  [[nodiscard]] bool by_field() const { return !field_O.isZero(0); }
   [[nodiscard]] bool clipped(double reading_radps) const;
   /// Marks the axes at full scale and adds what their readings lack.
-  void complete(ImuInterval& imu);
+  /// @param R_OB at the interval's begin
+  void complete(ImuInterval& imu, const Mat3& R_OB = Mat3::Identity());
 
  private:
   [[nodiscard]] double missing(int axis, double side) const;
+  /// Follows the field, and turns to where it is.
+  /// @return what the readings lack over the interval, rad/s
+  double follow_field(int axis, double side, const ImuInterval& imu, const Mat3& R_OB);
 
   Vec3 acceleration_radps2_ = Vec3::Zero();  ///< of the last sound readings
   Vec3 clipped_s_ = Vec3::Zero();            ///< since then
+  Vec3 followed_radps_ = Vec3::Zero();       ///< beyond the full scale, by the field
 };
 
 /// Learns the full scale: a clipped axis repeats its reading, which noise keeps a sound one from.

@@ -26,7 +26,9 @@ void ImuPredictor::anchor(Stamp stamp, const NavigationState& state, double acce
   head_ = state;
   head_stamp_ = stamp;
   accel_scale_ = accel_scale;
+  const double known_full_scale = completion_.full_scale_radps;
   completion_ = completion;
+  if (known_full_scale > 0) completion_.full_scale_radps = known_full_scale;
   advance();
 }
 
@@ -56,7 +58,7 @@ void ImuPredictor::advance() {
 
 void ImuPredictor::integrate(Stamp to, NavigationState& state, GyroCompletion& completion) const {
   for (ImuInterval& imu : imu_intervals(samples_, head_stamp_, to, accel_scale_, state.t_d)) {
-    completion.complete(imu);
+    completion.complete(imu, state.R_OB);
     state = propagate(state, imu);
   }
 }

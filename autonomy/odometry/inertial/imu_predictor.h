@@ -15,6 +15,8 @@ namespace arex {
 class ImuPredictor {
  public:
   void add(const ImuSample& imu);
+  /// Of the gyro, as soon as it is known; from the next sample on.
+  void set_gyro_full_scale(double radps) { completion_.full_scale_radps = radps; }
   /// Starts anew from the state at `stamp`.
   void anchor(Stamp stamp, const NavigationState& state, double accel_scale,
               const GyroCompletion& completion);

@@ -58,7 +58,7 @@ namespace {
 
 /// The reading at `stamp`, interpolated between the samples around it.
 void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scale, Vec3& gyro,
-              Vec3& accel) {
+              Vec3& accel, Vec3& field) {
   const auto after =
       std::lower_bound(samples.begin(), samples.end(), stamp,
                        [](const ImuSample& sample, Stamp t) { return sample.stamp < t; });
@@ -66,6 +66,7 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
     const ImuSample& held = after == samples.end() ? samples.back() : *after;
     gyro = held.gyro_radps;
     accel = accel_scale * held.accel_mps2;
+    field = held.field_gauss;
     return;
   }
   const ImuSample& a = *(after - 1);
@@ -73,6 +74,7 @@ void read_imu(std::span<const ImuSample> samples, Stamp stamp, double accel_scal
   const double s = static_cast<double>(stamp - a.stamp) / static_cast<double>(b.stamp - a.stamp);
   gyro = a.gyro_radps + s * (b.gyro_radps - a.gyro_radps);
   accel = accel_scale * (a.accel_mps2 + s * (b.accel_mps2 - a.accel_mps2));
+  field = a.field_gauss + s * (b.field_gauss - a.field_gauss);
 }
 
 }  // namespace
@@ -87,17 +89,20 @@ std::vector<ImuInterval> imu_intervals(std::span<const ImuSample> samples, Stamp
   to += delay;
   ImuInterval interval;
   interval.begin = from;
-  read_imu(samples, from, accel_scale, interval.gyro_begin, interval.accel_begin);
+  Vec3 field_end = Vec3::Zero();
+  read_imu(samples, from, accel_scale, interval.gyro_begin, interval.accel_begin,
+           interval.field_begin);
   auto next = std::upper_bound(samples.begin(), samples.end(), from,
                                [](Stamp t, const ImuSample& sample) { return t < sample.stamp; });
   while (interval.begin < to) {
     interval.end = next == samples.end() ? to : std::min(next->stamp, to);
-    read_imu(samples, interval.end, accel_scale, interval.gyro_end, interval.accel_end);
+    read_imu(samples, interval.end, accel_scale, interval.gyro_end, interval.accel_end, field_end);
     interval.held = interval.begin >= samples.back().stamp && to - samples.back().stamp > kJitter;
     intervals.push_back(interval);
     interval.begin = interval.end;
     interval.gyro_begin = interval.gyro_end;
     interval.accel_begin = interval.accel_end;
+    interval.field_begin = field_end;
     if (next != samples.end()) ++next;
   }
   for (ImuInterval& covered : intervals) {

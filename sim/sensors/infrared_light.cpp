@@ -16,9 +16,9 @@ constexpr double kLampReach = 9;            // further lamps give less than 2 lx
 constexpr double kLampNearest = 1.0;        // a strip is no point: nearer counts as this, m
 constexpr double kLampUp = 0.05;            // its intensity upwards, of that straight down
 constexpr double kLampLevel = 0.25;         // and just below the level
-constexpr double kMostAlbedo = 0.8;         // retro-reflectors send little anywhere else
+constexpr double kMostSent = 0.8;           // retro-reflectors send little anywhere else
 constexpr double kFurtherBounces = 1.35;  // 1 / (1 - albedo): light is followed for one bounce only
-constexpr double kGroundAlbedo = 0.25;    // of what lies outside of the world
+constexpr double kOutsideAlbedo = 0.25;   // of what lies outside of the world
 constexpr double kPi = std::numbers::pi;
 
 using Faces = std::array<double, 6>;
@@ -77,7 +77,7 @@ class Baker {
       : scene_(scene), sun_(sun), lamps_(lamps), directions_(sphere_directions()) {
     sun_lx_ = light.sun ? light.sun_lx : 0;
     sky_ = light.sky_lx / kPi;  // a face that sees all of it gets sky_lx
-    ground_ = kGroundAlbedo * (light.sky_lx + sun_lx_ * std::sin(light.sun_elevation_rad)) / kPi;
+    ground_ = kOutsideAlbedo * (light.sky_lx + sun_lx_ * std::sin(light.sun_elevation_rad)) / kPi;
     // Of flux F, over both half spaces: 2 pi (up + level + (1 - level) / 2) I = F.
     intensity_ = light.lamp_flux_lm / (kPi * (2 * kLampUp + 1 + kLampLevel));
   }
@@ -97,7 +97,7 @@ class Baker {
     for (std::size_t i = 0; i < kRays; ++i) {
       const RayHit& hit = around_.hits[i];
       if (!hit.valid()) continue;
-      const double albedo = std::min(static_cast<double>(hit.reflectivity), kMostAlbedo);
+      const double albedo = std::min(static_cast<double>(hit.reflectivity), kMostSent);
       const double lux = illuminance(hit, p.cast<float>(), directions_[i].cast<float>(), grid);
       add_from(directions_[i], kFurtherBounces * albedo * lux / kPi * kSolidAngle, faces);
     }

@@ -376,12 +376,13 @@ void ReplanMachine::recover(const GridView& grid, const Odometry& odometry, Stam
   const Stamp begin = now + from_seconds(config_.planning_latency_s);
   const MotionState start = state_at(begin, odometry);
   if (cause == StuckCause::kStartInInflation) {
-    if (recoveries_[0] < kMaxEscapes && try_escape(grid, start, begin, now)) return;
+    if (config_.recovers && recoveries_[0] < kMaxEscapes && try_escape(grid, start, begin, now)) return;
   } else if (++tries_ < config_.tries_per_recovery) {
     return;  // the next tick brings a newer grid and another seed
   }
   tries_ = 0;
-  const bool may_retreat = recoveries_[1] < kMaxRetreats || is_trapped(grid, start);
+  const bool may_retreat =
+      config_.recovers && (recoveries_[1] < kMaxRetreats || is_trapped(grid, start));
   if (may_retreat && try_back_off(grid, start, begin, now)) return;
   give_up(cause, now);
   enter(ReplanState::kWaitTarget, now);

@@ -1,5 +1,6 @@
 #include "stack/stack.h"
 
+#include <cmath>
 #include <utility>
 
 #include "stack/modules.h"
@@ -9,6 +10,11 @@ namespace {
 
 // An estimate comes with every sample of a 200 Hz IMU: one that has stopped is none.
 constexpr Stamp kOdometryStale = kNanosecondsPerSecond / 10;
+
+/// Whether an event says that a fault has ended.
+bool is_over(std::string_view detail) {
+  return detail.ends_with("again") || detail.ends_with("any more") || detail.ends_with("over");
+}
 
 /// What a scenario says under `modules` of a module.
 ConfigNode own_parameters(const StackConfig& config, const std::string& name) {
@@ -40,6 +46,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       jobs_(jobs),
       sources_(make_sources()),
       lidar_watch_(config_.odometry.watch),
+      health_watch_(config_.health),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
       explorer_(make(modules().explorers, config_.exploration.strategy, config_, seed)),
@@ -77,19 +84,24 @@ Stack::Source Stack::make_source(const std::string& name, const std::string& lan
 }
 
 void Stack::add_imu(const ImuSample& imu) {
+  health_watch_.add_imu(now_, imu);
   for (Source& source : sources_) {
     source.odometry->add_imu(imu);
     collect(source);
   }
 }
 
-void Stack::add_autopilot(const AutopilotStatus& status) { autopilot_ = status; }
+void Stack::add_autopilot(const AutopilotStatus& status) {
+  autopilot_ = status;
+  for (const Event& notice : status.notices) report(notice.kind, notice.detail);
+}
 
 void Stack::add_battery(const BatterySample& battery) {
   energy_.add(battery, odometry_.v_OB.norm(), !autopilot_.landed);
 }
 
 void Stack::add_mocap(const MocapSample& mocap) {
+  health_watch_.add_mocap(now_, mocap);
   for (Source& source : sources_) {
     source.odometry->add_mocap(mocap);
     collect(source);
@@ -97,6 +109,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
+  health_watch_.add_scan(now_, *scan);
   if (!scan->device.empty()) {  // for the maps only
     perception_.add_scan(now_, *scan);
     return;
@@ -132,7 +145,10 @@ void Stack::collect(Source& source) {
   }
 }
 
-void Stack::add_depth(const DepthImagePtr& depth) { perception_.add_depth(now_, depth); }
+void Stack::add_depth(const DepthImagePtr& depth) {
+  health_watch_.add_depth(now_, *depth);
+  perception_.add_depth(now_, depth);
+}
 
 bool Stack::accepts_depth(const std::string& device, Stamp stamp) {
   Stamp& next = next_depth_[device];
@@ -184,9 +200,7 @@ OdometryNeed Stack::odometry_need() const {
 std::optional<AttitudeCommand> Stack::tick() {
   if (now_ < next_control_) return std::nullopt;
   next_control_ += control_period_;
-  if (const auto fault = lidar_watch_.update(now_)) {
-    report(EventKind::kSensorFault, std::string(*fault));
-  }
+  watch_health();
   if (perception_.take_cloud_cut()) {
     report(EventKind::kMapFull, "mapping.cloud.max_points is reached, later points are left out");
   }
@@ -197,9 +211,29 @@ std::optional<AttitudeCommand> Stack::tick() {
   request_ = mission_.update(
       {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
        serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
-       !navigating_ && legs_.blocked(), ground_below(), at_reserve()});
+       !navigating_ && legs_.blocked(), ground_below(), at_reserve(), trouble_,
+       lidar_watch_.silent_s(now_)});
   setpoint_ = move(request_);
   return control(request_);
+}
+
+void Stack::watch_health() {
+  if (const auto fault = lidar_watch_.update(now_)) {
+    report(EventKind::kSensorFault, std::string(*fault));
+  }
+  HealthWatch::Flight flight;
+  flight.armed = autopilot_.armed;
+  flight.in_air = autopilot_.armed && !autopilot_.landed;
+  const bool located = odometry_.status == OdometryStatus::kOk;
+  if (located) {
+    const Vec3 up_B = odometry_.X_OB.R.row(2), autopilot_up_B = autopilot_.attitude.R_AB.row(2);
+    flight.attitude_difference_rad = std::atan2(up_B.cross(autopilot_up_B).norm(),
+                                                up_B.dot(autopilot_up_B));
+  }
+  // A landing aims below the ground.
+  const bool on_a_path = located && request_.kind != MotionRequest::Kind::kLand;
+  if (on_a_path) flight.off_path_m = (setpoint_.p_OB - odometry_.X_OB.p).norm();
+  for (const Event& event : health_watch_.update(now_, flight)) report(event.kind, event.detail);
 }
 
 void Stack::decide() {
@@ -308,6 +342,9 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
 }
 
 void Stack::report(EventKind kind, const std::string& detail) {
+  const bool is_fault = kind == EventKind::kSensorFault || kind == EventKind::kVehicleFault;
+  if (is_fault) trouble_ = is_over(detail) ? "" : detail.substr(0, detail.find(':'));
+  if (kind == EventKind::kVibration) trouble_ = is_over(detail) ? "" : "vibration";
   events_.push_back({now_, kind, detail});
 }
 

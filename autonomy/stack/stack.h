@@ -12,6 +12,7 @@
 #include "mission/mission.h"
 #include "odometry/odometry_source.h"
 #include "stack/flight_software.h"
+#include "stack/health_watch.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 #include "stack/navigator.h"
@@ -66,6 +67,7 @@ class Stack : public FlightSoftware {
   /// Takes what a source has found out since it was last asked.
   void collect(Source& source);
   void report(EventKind kind, const std::string& detail);
+  void watch_health();
   void set_odometry(const Odometry& odometry);
   [[nodiscard]] bool jumps_to(const Odometry& odometry) const;
   /// The pose has jumped: the map around the vehicle and the way through it begin anew.
@@ -89,6 +91,8 @@ class Stack : public FlightSoftware {
 
   std::vector<Source> sources_;  ///< the first flies
   LidarWatch lidar_watch_;
+  HealthWatch health_watch_;
+  std::string trouble_;  ///< the newest fault that has not been said to be over
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;

@@ -182,6 +182,7 @@ Physics::~Physics() = default;
 Physics::Physics(Physics&&) noexcept = default;
 Physics& Physics::operator=(Physics&&) noexcept = default;
 
+void Physics::set_faults(const DriveFaults& faults) { impl_->powertrain_.set_faults(faults); }
 void Physics::step(const MotorCommand& command) { impl_->step(command); }
 const Truth& Physics::truth() const { return impl_->truth_; }
 const BatteryState& Physics::battery() const { return impl_->powertrain_.battery(); }

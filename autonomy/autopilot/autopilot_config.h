@@ -1,6 +1,6 @@
 #pragma once
 
-#include "autopilot/health_monitor.h"
+#include "autopilot/health_config.h"
 #include "math/types.h"
 
 namespace arex {

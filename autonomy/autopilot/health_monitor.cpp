@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -23,7 +24,12 @@ constexpr StreamWatchConfig kPowerStream{.silent_s = 0.2, .stuck_readings = 100}
 }  // namespace
 
 void HealthMonitor::Steps::add(const Vec3& value, double share) {
-  if (squares >= 0) squares += share * ((value - last).squaredNorm() - squares);
+  // One jump, as when a stuck sensor comes back, is no noise: it counts for little at first.
+  constexpr double kOutlier = 25, kLeast = 1e-9;
+  const double step = (value - last).squaredNorm();
+  if (squares >= 0) {
+    squares += share * (std::min(step, kOutlier * std::max(squares, kLeast)) - squares);
+  }
   squares = std::max(squares, 0.0);
   last = value;
 }

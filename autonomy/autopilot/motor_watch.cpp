@@ -16,14 +16,21 @@ MotorWatch::Lowest MotorWatch::lowest(const Vec4& thrust_n) const {
 bool MotorWatch::grows(Suspicion& suspicion, const Lowest& lowest, double limit, double dt_s,
                        double needed_s) {
   if (lowest.fraction < limit || lowest.motor != suspicion.motor) {
-    suspicion = {lowest.motor, 0, suspicion.told && lowest.motor == suspicion.motor};
+    suspicion.motor = lowest.motor;
+    suspicion.since_s = 0;
     return false;
   }
   suspicion.since_s += dt_s;
-  return suspicion.since_s >= needed_s && !std::exchange(suspicion.told, true);
+  bool& told = suspicion.told[static_cast<std::size_t>(lowest.motor)];
+  return suspicion.since_s >= needed_s && !std::exchange(told, true);
 }
 
 void MotorWatch::update(const Missing& missing, double dt_s) {
+  constexpr double kCarried = 0.05;  // of the weight: by the ground, not by the rotors
+  if (missing.steady[0] > kCarried * 4 * hover_n_) {
+    reset();
+    return;
+  }
   steady_n_ += dt_s / (dt_s + kSteady_s) * (mix_ * missing.steady - steady_n_);
   at_once_n_ += dt_s / (dt_s + kAtOnce_s) * (mix_ * missing.at_once - at_once_n_);
   const Lowest steady = lowest(steady_n_), at_once = lowest(at_once_n_);

@@ -3,35 +3,17 @@
 #include <array>
 #include <optional>
 
+#include "autopilot/health_config.h"
 #include "math/types.h"
 
 namespace arex {
 
-/// When a motor is called weak.
-struct MotorWatchConfig {
-  double weak_fraction = 0.07;   ///< of a hovering rotor's thrust; sound flights stay below 0.04
-  double weak_s = 1.0;           ///< and for so long
-  double stopped_fraction = 0.5; ///< of a hovering rotor's thrust
-  double stopped_s = 0.05;
-
-  void fields(auto& f) {
-    f("weak_fraction", weak_fraction,
-      "a rotor that gives this part of its hover thrust less than the others do is weak");
-    f("weak_s", weak_s, "for so long");
-    f("stopped_fraction", stopped_fraction, "one that gives this part less has stopped");
-    f("stopped_s", stopped_s, "for so long");
-    f.check(weak_fraction > 0 && stopped_fraction > weak_fraction,
-            "0 < weak_fraction < stopped_fraction");
-    f.check(weak_s > 0 && stopped_s > 0, "weak_s, stopped_s > 0");
-  }
-};
-
 /// Finds the rotor that gives less than it is told, without a word from the speed controllers.
 ///
-/// What thrust and torque are missing, by the accelerometer and by what the rate loop has to add, is
-/// shared out among the rotors by the inverse of the allocation. A weak rotor stands out alone. A
-/// shifted centre of mass, drag and wind take from two at once, and a wrong mass from all four: so
-/// what counts is the lowest against the second lowest.
+/// What thrust and torque are missing, by the accelerometer and by what the rate loop has to add,
+/// is shared out among the rotors by the inverse of the allocation. A weak rotor stands out alone.
+/// A shifted centre of mass, drag and wind take from two at once, and a wrong mass from all four:
+/// so what counts is the lowest against the second lowest.
 class MotorWatch {
  public:
   /// @param mix the allocation's inverse: wrench (thrust N, torque N m in B) to rotor thrusts
@@ -64,7 +46,7 @@ class MotorWatch {
   struct Suspicion {
     int motor = -1;
     double since_s = 0;
-    bool told = false;
+    std::array<bool, 4> told{};  ///< of each motor, once a flight
   };
   struct Lowest {
     int motor = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "messages/sensors.h"
@@ -16,8 +17,10 @@ class PackWatch {
       const double dv = sample.voltage_v - last_.voltage_v;
       const double di = sample.current_a - last_.current_a;
       const double kept = 1 - to_seconds(sample.stamp - last_.stamp) / kMemory_s;
-      products_ = kept * products_ - dv * di;
-      squares_ = kept * squares_ + di * di;
+      // A cell that fails is a step of the voltage, not its answer to the current.
+      const double counts = std::abs(dv) < kLargestStep_v ? 1 : 0;
+      products_ = kept * products_ - counts * dv * di;
+      squares_ = kept * squares_ + counts * di * di;
     }
     last_ = sample;
     has_last_ = true;
@@ -31,7 +34,8 @@ class PackWatch {
 
  private:
   static constexpr double kMemory_s = 3;
-  static constexpr double kLeast_a2 = 4;
+  static constexpr double kLeast_a2 = 1;
+  static constexpr double kLargestStep_v = 0.25;
 
   BatterySample last_;
   bool has_last_ = false;

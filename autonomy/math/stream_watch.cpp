@@ -40,7 +40,8 @@ void StreamWatch::learn(double delay_s, double period_s) {
 
 StreamWatch::State StreamWatch::newest(Stamp now, bool lively) const {
   if (now - arrived_ > from_seconds(config_.silent_s)) return State::kSilent;
-  if (lively && same_ >= config_.stuck_readings) return State::kStuck;
+  const bool counts = lively || state_ == State::kStuck;  // at rest it is not sound again
+  if (counts && same_ >= config_.stuck_readings) return State::kStuck;
   if (delay_s_ > usual_delay_s_ + config_.late_s) return State::kLate;
   return missing_ > config_.missing_share ? State::kMissing : State::kSound;
 }

@@ -13,11 +13,11 @@ namespace arex {
 
 /// When a stream of readings is called faulty.
 struct StreamWatchConfig {
-  double silent_s = 0.5;         ///< without a reading: silent
-  int stuck_readings = 100;      ///< in a row without a changed bit: stuck; no real sensor is so still
-  double late_s = 0.03;          ///< readings come this much later than at first: late
-  double missing_share = 0.05;   ///< of the readings: they are missing
-  int learnt_readings = 200;     ///< over which the usual delay and period are learnt
+  double silent_s = 0.5;     ///< without a reading: silent
+  int stuck_readings = 100;  ///< in a row without a changed bit: stuck; no real sensor is so still
+  double late_s = 0.03;      ///< readings come this much later than at first: late
+  double missing_share = 0.05;  ///< of the readings: they are missing
+  int learnt_readings = 200;    ///< over which the usual delay and period are learnt
 };
 
 /// Watches the readings of one sensor as they arrive, whatever they mean: whether they come, come
@@ -62,8 +62,8 @@ class StreamWatch {
   int same_ = 0;      ///< in a row
   double usual_delay_s_ = 0;
   double usual_period_s_ = 0;
-  double delay_s_ = 0;    ///< averaged over a few readings
-  double missing_ = 0;    ///< share, averaged over some twenty
+  double delay_s_ = 0;  ///< averaged over a few readings
+  double missing_ = 0;  ///< share, averaged over some twenty
   State state_ = State::kSound;
   Stamp faulty_at_ = -1;  ///< when it last was
 };

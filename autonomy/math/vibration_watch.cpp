@@ -34,8 +34,10 @@ void VibrationWatch::add(const Vec3& gyro_radps, const Vec3& accel_mps2) {
 
 void VibrationWatch::close_window() {
   int strongest = 0;
-  newest_.gyro_radps = std::sqrt(gyro_squares_.maxCoeff(&strongest) / samples_);
-  newest_.accel_mps2 = std::sqrt(accel_squares_.maxCoeff() / samples_);
+  // The high-pass passes half the sample rate by 2 (1 - share) / (2 - share).
+  const double gain = (2 - share_) / (2 * (1 - share_));
+  newest_.gyro_radps = gain * std::sqrt(gyro_squares_.maxCoeff(&strongest) / samples_);
+  newest_.accel_mps2 = gain * std::sqrt(accel_squares_.maxCoeff() / samples_);
   newest_.frequency_hz =
       0.5 * crossings_[static_cast<std::size_t>(strongest)] * sample_hz_ / samples_;
   gyro_squares_.setZero();

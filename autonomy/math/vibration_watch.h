@@ -5,37 +5,21 @@
 #include <string>
 
 #include "math/types.h"
+#include "math/vibration_config.h"
 
 namespace arex {
 
-/// When an airframe is called shaking. The limits are beyond what the roughest of the recorded
-/// airframes reads (models/arex/README.md), and PX4's and ArduPilot's are of the same size:
-/// ArduPilot warns at 30 m/s^2 RMS.
-struct VibrationWatchConfig {
-  double gyro_limit_radps = 1.0;  ///< RMS of the strongest axis
-  double accel_limit_mps2 = 20;   ///< RMS of the strongest axis
-  double window_s = 0.5;
-
-  void fields(auto& f) {
-    f("gyro_limit_radps", gyro_limit_radps, "RMS of the strongest axis above 5 Hz that is told");
-    f("accel_limit_mps2", accel_limit_mps2, "RMS of the strongest axis above 5 Hz that is told");
-    f("window_s", window_s, "over which it is measured");
-    f.check(gyro_limit_radps > 0, "gyro_limit_radps > 0");
-    f.check(accel_limit_mps2 > 0, "accel_limit_mps2 > 0");
-    f.check(window_s >= 0.1 && window_s <= 60, "0.1 <= window_s <= 60");
-  }
-};
-
 /// How much one window shook, above 5 Hz.
 struct Vibration {
-  double gyro_radps = 0;   ///< RMS of the strongest axis
-  double accel_mps2 = 0;   ///< likewise
-  double frequency_hz = 0; ///< of the strongest axis of the gyro, by its zero crossings
+  double gyro_radps = 0;    ///< RMS of the strongest axis
+  double accel_mps2 = 0;    ///< likewise
+  double frequency_hz = 0;  ///< of the strongest axis of the gyro, by its zero crossings
 };
 
-/// Measures vibration by an IMU's samples: RMS of what a first-order high-pass leaves, and how often
-/// it crosses zero. A resonance is one line that stands out, and the crossings are its frequency;
-/// of broadband shaking they are a middle one. At a stack's 200 Hz, lines above 100 Hz alias.
+/// Measures vibration by an IMU's samples: RMS of what a first-order high-pass leaves, and how
+/// often it crosses zero. A resonance is one line that stands out, and the crossings are its
+/// frequency; of broadband shaking they are a middle one. At a stack's 200 Hz, lines above 100 Hz
+/// alias.
 class VibrationWatch {
  public:
   /// @param sample_hz of what add() is given

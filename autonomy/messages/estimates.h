@@ -41,8 +41,8 @@ struct AutopilotStatus {
   AttitudeEstimate attitude;
   bool ready = false;  ///< may be armed
   bool armed = false;
-  bool follows = false;  ///< armed, and past its spin-up: tracks commands
-  bool landed = true;    ///< not in the air as far as it knows
+  bool follows = false;          ///< armed, and past its spin-up: tracks commands
+  bool landed = true;            ///< not in the air as far as it knows
   std::vector<Event> notices{};  ///< what it has found to be wrong since it last told
 };
 

@@ -31,11 +31,10 @@ enum class EventKind : std::uint8_t {
   kFinished,        ///< detail: outcome and reason
 };
 inline constexpr std::array<std::string_view, 18> kEventKindNames{
-    "mission_state",  "armed",          "disarmed",        "target_selected",
-    "target_reached", "target_dropped", "odometry_status", "planner",
-    "stuck",          "recovery",       "battery",         "sensor_fault",
-    "vehicle_fault",  "vibration",      "collision",       "map_full",
-    "operator",       "finished"};
+    "mission_state",  "armed",           "disarmed",      "target_selected", "target_reached",
+    "target_dropped", "odometry_status", "planner",       "stuck",           "recovery",
+    "battery",        "sensor_fault",    "vehicle_fault", "vibration",       "collision",
+    "map_full",       "operator",        "finished"};
 
 struct Event {
   Stamp stamp = 0;

@@ -175,7 +175,7 @@ class Mission {
     std::string_view cause;                               ///< why it failed
     bool leg_blocked = false;                             ///< something stands in the way of a kLeg
     LandingGround below = LandingGround::kUnknown;        ///< where it would come down
-    bool at_reserve = false;  ///< of the battery: what is left is needed to land
+    bool at_reserve = false;   ///< of the battery: what is left is needed to land
     std::string_view trouble;  ///< the newest fault of sensors or vehicle that is not over
     double blind_s = 0;        ///< since the LiDAR's newest scan
   };
@@ -270,8 +270,8 @@ class Mission {
   OperatorCommand asked_;                   ///< what a hold is for
   MissionState held_ = MissionState::kFly;  ///< what it interrupted
   MotionRequest held_request_;
-  bool blind_ = false;                      ///< what it holds for
-  bool lands_blind_ = false;                ///< it knew that its odometry would not last
+  bool blind_ = false;        ///< what it holds for
+  bool lands_blind_ = false;  ///< it knew that its odometry would not last
   int orders_ = 0;
   bool home_in_reach_ = true;
 };

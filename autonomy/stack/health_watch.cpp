@@ -30,6 +30,7 @@ struct Survey {
 
 Survey survey(const DepthImage& image) {
   constexpr float kSameSurface = 0.1F;  // of the depth
+  constexpr float kNear_m = 3;          // beyond, a stereo camera's own noise is as large
   int looked = 0, valid = 0, smooth = 0;
   double deviation = 0;
   for (int v = 0; v < image.camera.height; v += kPixelStep) {
@@ -40,14 +41,16 @@ Survey survey(const DepthImage& image) {
       ++valid;
       const float left = image.at(u - 4, v), right = image.at(u + 4, v);
       const float mean = 0.5F * (left + right);
-      if (left == 0 || right == 0 || std::abs(left - right) > kSameSurface * mean) continue;
+      if (left == 0 || right == 0 || mean > kNear_m) continue;
+      if (std::abs(left - right) > kSameSurface * mean) continue;
       if (std::abs(here - mean) > 3 * kSameSurface * mean) continue;
       ++smooth;
       deviation += std::abs(here - mean) / mean;
     }
   }
   if (looked == 0) return {};
-  return {static_cast<double>(valid) / looked, smooth > 0 ? deviation / smooth : 0};
+  constexpr int kFew = 100;  // say nothing
+  return {static_cast<double>(valid) / looked, smooth >= kFew ? deviation / smooth : 0};
 }
 
 }  // namespace
@@ -78,12 +81,15 @@ void HealthWatch::add_scan(Stamp now, const LidarScan& scan) {
 void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   const std::string name = image.device.empty() ? "depth" : image.device;
   const Survey seen = survey(image);
-  stream(name, kDepthStream).add(now, image.stamp, std::array{seen.valid, seen.rough});
+  // Dark images are alike, and nothing stuck.
+  const double tells_apart = seen.valid > 0 ? 0 : to_seconds(image.stamp);
+  stream(name, kDepthStream).add(now, image.stamp, std::array{seen.valid, seen.rough, tells_apart});
   Images& images = images_[name];
   if (images.usual_valid < 0) images.usual_valid = seen.valid;
   if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;
   const bool blind = seen.valid < config_.blind_share * images.usual_valid;
-  const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_factor * images.usual_rough;
+  const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_fraction &&
+                     seen.rough > config_.rough_factor * images.usual_rough;
   images.blind = blind ? images.blind + 1 : 0;
   images.rough = rough ? images.rough + 1 : 0;
   // What is wrong does not become usual.

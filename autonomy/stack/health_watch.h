@@ -8,36 +8,9 @@
 #include "math/vibration_watch.h"
 #include "messages/events.h"
 #include "messages/sensors.h"
+#include "stack/health_watch_config.h"
 
 namespace arex {
-
-/// What the stack calls wrong with its sensors and its flight.
-struct HealthWatchConfig {
-  VibrationWatchConfig vibration;
-  double blind_share = 0.4;        ///< of the usual valid pixels; sound flights stay above 0.6
-  double rough_factor = 3;         ///< of the usual roughness of a depth image
-  int frames = 5;                  ///< in a row
-  double attitude_limit_rad = 0.2; ///< a tenth of it is what two sound estimates differ by
-  double off_path_m = 0.8;         ///< sound flights stay below 0.3
-  double lasting_s = 0.2;          ///< of the two above
-
-  void fields(auto& f) {
-    f("vibration", vibration, "when the airframe is called shaking, by the IMU's output");
-    f("blind_share", blind_share,
-      "a depth image with less than this part of the usual pixels is blinded");
-    f("rough_factor", rough_factor, "one that is this much rougher than usual is noisy");
-    f("frames", frames, "in a row");
-    f("attitude_limit_rad", attitude_limit_rad,
-      "autopilot and odometry contradict each other if their verticals differ by more");
-    f("off_path_m", off_path_m, "the vehicle is off its path if it is further from its setpoint");
-    f("lasting_s", lasting_s, "for so long");
-    f.check(blind_share > 0 && blind_share < 1, "0 < blind_share < 1");
-    f.check(rough_factor > 1, "rough_factor > 1");
-    f.check(frames >= 1 && frames <= 1000, "1 <= frames <= 1000");
-    f.check(attitude_limit_rad > 0 && off_path_m > 0 && lasting_s >= 0,
-            "attitude_limit_rad, off_path_m > 0, lasting_s >= 0");
-  }
-};
 
 /// What the companion computer can tell of its sensors without a word from their makers: whether
 /// messages come, change and are in time, what a depth image looks like against those before, and

@@ -68,8 +68,8 @@ class LidarWatch {
   /// What the firings between returns of one surface did.
   struct Survey {
     int between = 0;
-    int missing = 0;  ///< no return
-    int spikes = 0;   ///< a return elsewhere
+    int missing = 0;     ///< no return
+    int spikes = 0;      ///< a return elsewhere
     double noise_m = 0;  ///< mean deviation of the others from the surface
   };
   [[nodiscard]] Survey survey(const LidarScan& scan) const;

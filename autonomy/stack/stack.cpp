@@ -11,9 +11,28 @@ namespace {
 // An estimate comes with every sample of a 200 Hz IMU: one that has stopped is none.
 constexpr Stamp kOdometryStale = kNanosecondsPerSecond / 10;
 
+/// Whether one scan's points are the other's, bit for bit.
+bool is_same(const LidarScan& a, const LidarScan& b) {
+  return !a.points.empty() && a.points.size() == b.points.size() &&
+         a.points.front().p_L == b.points.front().p_L && a.points.back().p_L == b.points.back().p_L;
+}
+
 /// Whether an event says that a fault has ended.
 bool is_over(std::string_view detail) {
   return detail.ends_with("again") || detail.ends_with("any more") || detail.ends_with("over");
+}
+
+/// The first trouble that is not over: what came after it is more likely its consequence.
+std::string trouble_after(std::string trouble, EventKind kind, const std::string& detail) {
+  std::string name;
+  if (kind == EventKind::kVibration) name = "vibration";
+  if (kind == EventKind::kSensorFault || kind == EventKind::kVehicleFault) {
+    name = detail.substr(0, detail.find(':'));
+  }
+  if (name.empty()) return trouble;
+  if (!is_over(detail)) return trouble.empty() ? name : trouble;
+  const std::string whose = name.substr(0, name.find(' '));
+  return trouble.starts_with(whose) ? std::string() : trouble;
 }
 
 /// What a scenario says under `modules` of a module.
@@ -114,6 +133,11 @@ void Stack::add_scan(const LidarScanPtr& scan) {
     perception_.add_scan(now_, *scan);
     return;
   }
+  // A device that hangs goes on sending what it saw last: in the air that is as good as nothing,
+  // and worse for who believes it.
+  const bool repeats = last_scan_ && !autopilot_.landed && is_same(*scan, *last_scan_);
+  last_scan_ = scan;
+  if (repeats) return;
   lidar_watch_.add_scan(now_, *scan);
   for (Source& source : sources_) {
     if (auto job = source.odometry->add_scan(scan)) {
@@ -208,11 +232,11 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ = mission_.update(
-      {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
-       serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
-       !navigating_ && legs_.blocked(), ground_below(), at_reserve(), trouble_,
-       lidar_watch_.silent_s(now_)});
+  request_ =
+      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
+                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
+                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below(),
+                       at_reserve(), trouble_, lidar_watch_.silent_s(now_)});
   setpoint_ = move(request_);
   return control(request_);
 }
@@ -227,8 +251,8 @@ void Stack::watch_health() {
   const bool located = odometry_.status == OdometryStatus::kOk;
   if (located) {
     const Vec3 up_B = odometry_.X_OB.R.row(2), autopilot_up_B = autopilot_.attitude.R_AB.row(2);
-    flight.attitude_difference_rad = std::atan2(up_B.cross(autopilot_up_B).norm(),
-                                                up_B.dot(autopilot_up_B));
+    flight.attitude_difference_rad =
+        std::atan2(up_B.cross(autopilot_up_B).norm(), up_B.dot(autopilot_up_B));
   }
   // A landing aims below the ground.
   const bool on_a_path = located && request_.kind != MotionRequest::Kind::kLand;
@@ -342,9 +366,7 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
 }
 
 void Stack::report(EventKind kind, const std::string& detail) {
-  const bool is_fault = kind == EventKind::kSensorFault || kind == EventKind::kVehicleFault;
-  if (is_fault) trouble_ = is_over(detail) ? "" : detail.substr(0, detail.find(':'));
-  if (kind == EventKind::kVibration) trouble_ = is_over(detail) ? "" : "vibration";
+  trouble_ = trouble_after(std::move(trouble_), kind, detail);
   events_.push_back({now_, kind, detail});
 }
 

@@ -91,8 +91,9 @@ class Stack : public FlightSoftware {
 
   std::vector<Source> sources_;  ///< the first flies
   LidarWatch lidar_watch_;
+  LidarScanPtr last_scan_;  ///< of the first LiDAR
   HealthWatch health_watch_;
-  std::string trouble_;  ///< the newest fault that has not been said to be over
+  std::string trouble_;  ///< the first fault that has not been said to be over
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;

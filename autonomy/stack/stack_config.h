@@ -20,7 +20,7 @@
 #include "odometry/lidar_inertial_config.h"
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
-#include "stack/health_watch.h"
+#include "stack/health_watch_config.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 

@@ -78,8 +78,7 @@ void FlexibleFrame::move_plate(const Truth& rigid) {
   plate_ = rigid;
   plate_.X_WB.R = rigid.X_WB.R * so3::Exp(turn);
   plate_.X_WB.p = rigid.X_WB.p + rigid.X_WB.R * shift;
-  plate_.w_WB_B =
-      so3::Exp(-turn) * rigid.w_WB_B + so3::right_jacobian(turn) * (r * turn_.rate);
+  plate_.w_WB_B = so3::Exp(-turn) * rigid.w_WB_B + so3::right_jacobian(turn) * (r * turn_.rate);
   plate_.v_WB = rigid.v_WB + rigid.X_WB.R * (r * shift_.rate + rigid.w_WB_B.cross(shift));
   if (!begun_) return;
   plate_.a_WB = (plate_.v_WB - before.v_WB) / kSecondsPerTick;

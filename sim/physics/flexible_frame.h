@@ -11,16 +11,17 @@ namespace arex::sim {
 
 /// How the airframe gives way. As made it is stiff.
 struct FrameConfig {
-  double load_ratio = 0;       ///< 0 stiff; else of the load's inertia (mass) to the plate's
-  double mode_hz = 80;         ///< [E]
-  double mode_damping = 0.03;  ///< [E] carbon plates, bolted
-  double unbalance_n = 1.0;    ///< [E] 13 g propeller, 0.15 mm off its axis at 716 rad/s
-  double unbalance_height_m = 0.03;     ///< [E] of the propellers above the centre of mass
-  double reference_speed_radps = 716;   ///< hover
+  double load_ratio = 0;             ///< 0 stiff; else of the load's inertia (mass) to the plate's
+  double mode_hz = 80;               ///< [E]
+  double mode_damping = 0.03;        ///< [E] carbon plates, bolted
+  double unbalance_n = 1.0;          ///< [E] 13 g propeller, 0.15 mm off its axis at 716 rad/s
+  double unbalance_height_m = 0.03;  ///< [E] of the propellers above the centre of mass
+  double reference_speed_radps = 716;  ///< hover
 
   void fields(auto& f) {
     f("load_ratio", load_ratio,
-      "0 stiff frame; else inertia and mass of the load (battery, computer) over those of the plate "
+      "0 stiff frame; else inertia and mass of the load (battery, computer) over those of the "
+      "plate "
       "with arms, IMU, LiDAR and camera, which gives way against it");
     f("mode_hz", mode_hz, "at which the plate swings against the load [E]");
     f("mode_damping", mode_damping, "its damping ratio [E]");
@@ -41,8 +42,8 @@ struct FrameConfig {
 ///
 /// A force that gives the whole the acceleration a moves the plate, beside the rigid motion, by
 /// r q, r the load over the plate, with q'' + 2 z w q' + w^2 q = a; likewise about each axis with
-/// the angular acceleration. For two bodies on one spring this is exact, and the whole moves as if it
-/// were stiff. The forces are those of the rigid body's own motion, the rotors' torques among
+/// the angular acceleration. For two bodies on one spring this is exact, and the whole moves as if
+/// it were stiff. The forces are those of the rigid body's own motion, the rotors' torques among
 /// them, so that the rate loop drives the mode that its gyro hears; and the unbalance of the
 /// propellers, whose centrifugal forces turn with them.
 ///

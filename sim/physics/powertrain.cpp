@@ -106,7 +106,8 @@ double Powertrain::faulty_throttle(std::size_t motor, double throttle) const {
   const double share = faults_.thrust_share[motor];
   if (share == 1) return throttle;
   const double kt = motor_.torque_constant_nm_per_a;
-  const double bend = motor_.resistance_ohm * rotor_.thrust_coefficient * rotor_.torque_ratio_m / kt;
+  const double bend =
+      motor_.resistance_ohm * rotor_.thrust_coefficient * rotor_.torque_ratio_m / kt;
   const double lost_v = motor_.resistance_ohm * motor_.no_load_current_a;
   const double volts = std::max(throttle * state_.voltage_v - lost_v, 0.0);
   const double speed = (std::sqrt(kt * kt + 4 * bend * volts) - kt) / (2 * bend);
@@ -134,9 +135,8 @@ void Powertrain::step(const MotorCommand& command) {
   }
 
   // From V = E - R_b I rather than from the load, so that charge and energy close exactly.
-  state_.current_a = battery_ohm() > 0
-                         ? (open_circuit_v() - bus_v) / battery_ohm()
-                         : load(throttle, bus_v).current_a;
+  state_.current_a = battery_ohm() > 0 ? (open_circuit_v() - bus_v) / battery_ohm()
+                                       : load(throttle, bus_v).current_a;
   state_.voltage_v = bus_v;
   state_.used_wh += bus_v * state_.current_a * kSecondsPerTick / kSecondsPerHour;
   charge_ -= state_.current_a * kSecondsPerTick / (battery_.capacity_ah * kSecondsPerHour);

@@ -75,7 +75,8 @@ std::vector<OutcomeRow> outcome_matrix(const ResultTable& results) {
     ++count_for(*row, outcome);
     if (outcome.empty()) continue;
     row->untold += outcome == "collided" && event.empty();
-    ++told[static_cast<std::size_t>(row - rows.begin())][event.empty() ? "nothing" : type_of(event)];
+    ++told[static_cast<std::size_t>(row - rows.begin())]
+          [event.empty() ? "nothing" : type_of(event)];
     row->told_after_s = std::fmax(row->told_after_s, after_s[i]);
   }
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].told = list_of(told[i]);
@@ -89,7 +90,8 @@ std::string outcomes_html(const ResultTable& results) {
     any = any || !table.text(i, "faults.told").empty();
   }
   if (!any) return {};
-  static constexpr std::array kHeads{"continued", "landed", "collided", "lost", "timed out", "broken"};
+  static constexpr std::array kHeads{"continued", "landed",    "collided",
+                                     "lost",      "timed out", "broken"};
   std::string html =
       "<section id=\"outcomes\">\n<h2>What became of the faults</h2>\n<div class=\"scroll\">"
       "<table class=\"data\">\n<thead><tr><th class=\"word\">fault</th>";

@@ -446,8 +446,8 @@ std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
 
 const std::vector<FigureInfo>& figure_list() {
   static const auto list = joined<FigureInfo>(
-      {run_figures(), fault_figures(), coverage_figures(), exploration_figures(), tour_figures(), map_figures(),
-       odometry_source_figures(), odometry_figures("odometry.", true),
+      {run_figures(), fault_figures(), coverage_figures(), exploration_figures(), tour_figures(),
+       map_figures(), odometry_source_figures(), odometry_figures("odometry.", true),
        odometry_figures("odometries.NAME.", false), semantic_figures(), flight_figures()});
   return list;
 }

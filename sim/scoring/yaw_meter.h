@@ -11,7 +11,8 @@ namespace arex::sim {
 /// this.
 class YawMeter {
  public:
-  /// A rate beyond which a turn counts as a spin: what planned headings never exceed (planning.yaw).
+  /// A rate beyond which a turn counts as a spin: what planned headings never exceed
+  /// (planning.yaw).
   static constexpr double kSpin_radps = 1.5;
 
   /// After each physics tick.

@@ -52,7 +52,8 @@ void DepthDevice::fire(const Moment& moment) {
 }
 
 void DepthDevice::pass(const std::optional<DepthImagePtr>& frame) {
-  line_.pass(now_, frame, [this](const DepthImagePtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
+  line_.pass(now_, frame,
+             [this](const DepthImagePtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
 }
 
 void DepthDevice::hand_on(const DepthImagePtr& frame, std::uint64_t hash) {

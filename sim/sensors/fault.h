@@ -53,7 +53,7 @@ struct FaultConfig {
   double to_s = 1e9;
   double delay_s = 0.2;            ///< [E] a full queue of a 10 Hz driver: two frames
   double share = 0.2;              ///< [E]
-  double gyro_noise_radps = 0.5;   ///< [E] five times what a typical airframe shakes
+  double gyro_noise_radps = 0.8;   ///< [E] five times what a typical airframe shakes
   double accel_noise_mps2 = 10;    ///< [E] likewise
   double field_noise_gauss = 0.2;  ///< [E] half of the Earth's field: a power line nearby
   double pressure_noise_pa = 30;   ///< [E] 2.5 m of height: an open case in the propellers' wash

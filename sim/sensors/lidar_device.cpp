@@ -94,7 +94,8 @@ void LidarDevice::deliver(const Frame& frame) {
 }
 
 void LidarDevice::pass(const std::optional<LidarScanPtr>& scan) {
-  line_.pass(now_, scan, [this](const LidarScanPtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
+  line_.pass(now_, scan,
+             [this](const LidarScanPtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
 }
 
 void LidarDevice::hand_on(const LidarScanPtr& scan, std::uint64_t hash) {

@@ -128,8 +128,7 @@ LidarScanPtr spoilt(const LidarScanPtr& reading, const FaultConfig& fault, Rando
   return scan;
 }
 
-DepthImagePtr spoilt(const DepthImagePtr& reading, const FaultConfig& fault,
-                     RandomStream& random) {
+DepthImagePtr spoilt(const DepthImagePtr& reading, const FaultConfig& fault, RandomStream& random) {
   auto image = std::make_shared<DepthImage>(*reading);
   if (fault.kind == FaultKind::kBlinded) blind(*image, fault.share, random);
   if (fault.kind != FaultKind::kNoisy) return image;

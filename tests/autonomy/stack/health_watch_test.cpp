@@ -17,10 +17,10 @@ class Camera {
     for (int i = 0; i < frames; ++i, now_ += kNanosecondsPerSecond / 10) {
       DepthImage image;
       image.stamp = now_;
-      image.camera = {160, 120, 80, 80, 80, 60};
-      image.depth_m.resize(160 * 120);
+      image.camera = {320, 240, 160, 160, 160, 120};
+      image.depth_m.resize(320 * 240);
       for (std::size_t k = 0; k < image.depth_m.size(); ++k) {
-        const double slant = 3 + 0.01 * static_cast<double>(k % 160);
+        const double slant = 1.5 + 0.004 * static_cast<double>(k % 320);
         const double depth = slant * (1 + (noise_fraction + 0.002) * noise_.normal());
         image.depth_m[k] = noise_.uniform() < valid_share ? static_cast<float>(depth) : 0.0F;
       }

@@ -36,14 +36,15 @@ TEST(FaultConfig, TakesEveryDeviceWithWhatCanGoWrongWithIt) {
 TEST(FaultConfig, RefusesWhatCannotBeWithItsLine) {
   const auto expect = [](const std::string& fault, const std::string& place,
                          const std::string& rule) {
-    const std::string message = refusal_of("  - {device: lidar, kind: silent}\n  - " + fault + "\n");
+    const std::string message =
+        refusal_of("  - {device: lidar, kind: silent}\n  - " + fault + "\n");
     EXPECT_EQ(message.substr(0, place.size()), place) << message;
     EXPECT_NE(message.find(rule), std::string::npos) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   };
   expect("{device: motor, kind: silent}", "s.yaml:4: ", "kind of motor: one of weak");
-  expect("{device: imu, kind: blinded}", "s.yaml:4: ",
-         "kind of imu: one of silent, stuck, delayed, noisy, dropping");
+  expect("{device: imu, kind: blinded}",
+         "s.yaml:4: ", "kind of imu: one of silent, stuck, delayed, noisy, dropping");
   expect("{device: lidar, kind: slient}", "s.yaml:4: ", "silent");
   expect("{kind: silent}", "s.yaml:4: ", "device");
   expect("{device: lidar, kind: silent, from_s: 5, to_s: 4}", "s.yaml:4: ", "to_s > from_s");

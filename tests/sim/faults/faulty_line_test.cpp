@@ -32,9 +32,11 @@ std::vector<Arrived> count(const std::vector<FaultConfig>& faults, std::uint64_t
   std::vector<Arrived> arrived;
   for (Stamp now = 0; now < 3 * kNanosecondsPerSecond; now += kTick) {
     std::optional<BarometerSample> reading;
-    if (now % (20 * kTick) == 0) reading = {now, 100000.0 + static_cast<double>(now / (20 * kTick))};
-    line.pass(now, reading,
-              [&](const BarometerSample& sample) { arrived.push_back({now, sample}); });
+    if (now % (20 * kTick) == 0)
+      reading = {now, 100000.0 + static_cast<double>(now / (20 * kTick))};
+    line.pass(now, reading, [&](const BarometerSample& sample) {
+      arrived.push_back({now, sample});
+    });
   }
   return arrived;
 }
@@ -47,7 +49,8 @@ bool in_fault(const Arrived& arrived) {
 TEST(FaultyLine, WithoutAFaultOfItsOwnItHandsOnWhatItIsGiven) {
   for (const auto& arrived : count({fault_of("magnetometer", FaultKind::kSilent)})) {
     EXPECT_EQ(arrived.at, arrived.sample.stamp);
-    EXPECT_EQ(arrived.sample.pressure_pa, 100000.0 + static_cast<double>(arrived.at / (20 * kTick)));
+    EXPECT_EQ(arrived.sample.pressure_pa,
+              100000.0 + static_cast<double>(arrived.at / (20 * kTick)));
   }
 }
 

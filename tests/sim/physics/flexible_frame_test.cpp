@@ -78,7 +78,8 @@ TEST(FlexibleFrame, HangsInItsSpringFromTheBegin) {
   }
 }
 
-// Whoever integrates what an IMU on the plate reads finds its pose: rates and pose are of one motion.
+// Whoever integrates what an IMU on the plate reads finds its pose: rates and pose are of one
+// motion.
 TEST(FlexibleFrame, ItsRatesAreThoseOfItsPose) {
   FrameConfig config = soft(30, 0.02, 3);
   config.unbalance_n = 2;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "report/page.h"
+#include "run/markup.h"
 
 namespace arex::sim {
 namespace {

@@ -31,6 +31,8 @@ class RateControl {
   void reset(const Vec3& rate);
 
   [[nodiscard]] const Vec3& integral_nm() const { return integral_; }
+  /// The newest demand, N m.
+  [[nodiscard]] const Vec3& demand_nm() const { return demand_; }
 
  private:
   AttitudeControlConfig config_;

@@ -26,6 +26,7 @@ Autopilot::Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle
       motor_(config.motor, vehicle),
       rate_control_(config.control),
       land_detector_(config.land, vehicle),
+      health_(config.health, allocation_.mix(), vehicle.mass_kg * kGravity),
       gyro_filter_(kImuHz, config.control.gyro_cutoff_hz),
       support_filter_(kImuHz, kSupportCutoffHz),
       rate_period_(period_of(config.control.rate_loop_hz)),
@@ -38,6 +39,17 @@ void Autopilot::add_imu(const ImuSample& imu) {
   const double support = vehicle_.mass_kg * imu.accel_mps2.z() - rotor_thrust_n_;
   support_n_ = support_filter_.update(Vec3(support, 0, 0)).x();
   last_imu_ = imu.stamp;
+  health_.add_imu(now_, imu);
+}
+
+void Autopilot::add_magnetometer(const MagnetometerSample& sample) {
+  ahrs_.add_magnetometer(sample);
+  health_.add_magnetometer(now_, sample);
+}
+
+void Autopilot::add_barometer(const BarometerSample& sample) {
+  ahrs_.add_barometer(sample);
+  health_.add_barometer(now_, sample);
 }
 
 void Autopilot::add_battery(const BatterySample& sample) {
@@ -45,6 +57,7 @@ void Autopilot::add_battery(const BatterySample& sample) {
   const double share = battery_stamp_ == 0 ? 1 : dt / (dt + config_.motor.voltage_filter_s);
   voltage_v_ += share * (sample.voltage_v - voltage_v_);
   battery_stamp_ = sample.stamp;
+  health_.add_battery(now_, sample);
 }
 
 void Autopilot::command(const AttitudeCommand& command) {
@@ -56,9 +69,11 @@ void Autopilot::command(const AttitudeCommand& command) {
 AttitudeEstimate Autopilot::attitude() const { return {last_imu_, ahrs_.R_AB(), rate_B_}; }
 
 MotorCommand Autopilot::tick(Stamp now) {
+  now_ = now;
   if (now % attitude_period_ == 0) {
     update_state(now);
     update_targets(to_seconds(attitude_period_));
+    watch_health(to_seconds(attitude_period_));
   }
   if (now % rate_period_ == 0) {
     run_rate_loop();
@@ -185,6 +200,17 @@ void Autopilot::run_rate_loop() {
   for (int i = 0; i < 4; ++i) {
     motors_.throttle[static_cast<std::size_t>(i)] = motor_.throttle(thrust[i], voltage_v_);
   }
+}
+
+void Autopilot::watch_health(double dt) {
+  HealthMonitor::Flight flight;
+  flight.armed = armed();
+  flight.in_air = !landed() && !contact_;
+  flight.tilt_rad = std::acos(std::clamp(ahrs_.R_AB()(2, 2), -1.0, 1.0));
+  // What the rate loop adds in the mean is what the rotors fail to give.
+  flight.missing.steady << support_n_, -rate_control_.integral_nm();
+  flight.missing.at_once << support_n_, -rate_control_.demand_nm();
+  health_.update(now_, flight, dt);
 }
 
 void Autopilot::follow_rotors(double dt) {

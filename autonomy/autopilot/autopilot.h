@@ -4,6 +4,7 @@
 #include "autopilot/allocation.h"
 #include "autopilot/attitude_control.h"
 #include "autopilot/autopilot_config.h"
+#include "autopilot/health_monitor.h"
 #include "autopilot/land_detector.h"
 #include "autopilot/low_pass.h"
 #include "autopilot/motor_model.h"
@@ -39,8 +40,8 @@ class Autopilot {
   Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle);
 
   void add_imu(const ImuSample& imu);  ///< raw, 1 kHz
-  void add_magnetometer(const MagnetometerSample& sample) { ahrs_.add_magnetometer(sample); }
-  void add_barometer(const BarometerSample& sample) { ahrs_.add_barometer(sample); }
+  void add_magnetometer(const MagnetometerSample& sample);
+  void add_barometer(const BarometerSample& sample);
   void add_battery(const BatterySample& sample);
 
   /// Takes the newest command; an older one than the present is dropped.
@@ -58,6 +59,9 @@ class Autopilot {
   /// Flying, but the ground carries a part of the weight: before lift-off, after touchdown.
   [[nodiscard]] bool ground_contact() const { return contact_; }
   [[nodiscard]] const Ahrs& ahrs() const { return ahrs_; }
+  [[nodiscard]] const HealthMonitor& health() const { return health_; }
+  /// What it has found to be wrong with sensors, motors and airframe since the last call.
+  std::vector<Event> take_notices() { return health_.take_notices(); }
 
  private:
   void update_state(Stamp now);
@@ -67,6 +71,7 @@ class Autopilot {
   double descent_thrust(double dt);
   void run_rate_loop();
   void follow_rotors(double dt);
+  void watch_health(double dt);
 
   AutopilotConfig config_;
   VehicleConfig vehicle_;
@@ -75,6 +80,7 @@ class Autopilot {
   MotorModel motor_;
   RateControl rate_control_;
   LandDetector land_detector_;
+  HealthMonitor health_;
   LowPass gyro_filter_;
   LowPass support_filter_;
   Stamp rate_period_;
@@ -85,6 +91,7 @@ class Autopilot {
   bool must_release_ = false;  ///< kDisarmed has to be seen before arming
   AttitudeCommand command_;
   bool commanded_ = false;
+  Stamp now_ = 0;  ///< of the newest tick: what arrives is as old at most
   Stamp last_imu_ = 0;
   Stamp battery_stamp_ = 0;
   double voltage_v_;

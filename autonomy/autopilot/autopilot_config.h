@@ -1,5 +1,6 @@
 #pragma once
 
+#include "autopilot/health_config.h"
 #include "math/types.h"
 
 namespace arex {
@@ -150,6 +151,7 @@ struct AutopilotConfig {
   MotorBelief motor;
   AttitudeControlConfig control;
   LandDetectorConfig land;
+  HealthConfig health;
   double arming_tilt_rad = 0.45;  ///< no arming beyond
   double spin_up_s = 1.0;         ///< idle before thrust is given
   double takeoff_thrust_fraction =
@@ -164,6 +166,7 @@ struct AutopilotConfig {
     f("motor", motor, "believed motor constants");
     f("control", control, "attitude and rate loops");
     f("land", land, "touchdown detector");
+    f("health", health, "what it calls wrong with the vehicle");
     f("arming_tilt_rad", arming_tilt_rad, "largest tilt at which the motors may be armed");
     f("spin_up_s", spin_up_s, "idle before thrust is given");
     f("takeoff_thrust_fraction", takeoff_thrust_fraction, "demanded part of the weight: take-off");

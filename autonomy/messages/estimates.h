@@ -3,9 +3,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <string_view>
+#include <vector>
 
 #include "math/pose.h"
 #include "math/types.h"
+#include "messages/events.h"
 
 /// What the modules of the stack tell each other.
 namespace arex {
@@ -39,8 +41,9 @@ struct AutopilotStatus {
   AttitudeEstimate attitude;
   bool ready = false;  ///< may be armed
   bool armed = false;
-  bool follows = false;  ///< armed, and past its spin-up: tracks commands
-  bool landed = true;    ///< not in the air as far as it knows
+  bool follows = false;          ///< armed, and past its spin-up: tracks commands
+  bool landed = true;            ///< not in the air as far as it knows
+  std::vector<Event> notices{};  ///< what it has found to be wrong since it last told
 };
 
 /// Where the vehicle should be at one moment, in O.

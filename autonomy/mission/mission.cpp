@@ -32,6 +32,7 @@ MotionRequest Mission::update(const Inputs& inputs) {
     was_armed_ = inputs.armed;
   }
   watch_odometry(inputs);
+  watch_sight(inputs);
   watch_link(inputs);
   obey(inputs);
   switch (state_) {
@@ -61,7 +62,7 @@ MotionRequest Mission::update(const Inputs& inputs) {
       break;
     case MissionState::kLost:
       if (!inputs.armed) {
-        lost_ = true;
+        lost_ = !lands_blind_;
         enter(MissionState::kDone, inputs);
       } else if (inputs.now - lost_since_ >= from_seconds(config_.lost_hover_s)) {
         request_ = {MotionRequest::Kind::kDescend, Vec3::Zero()};
@@ -91,7 +92,8 @@ void Mission::take_off(const Inputs& inputs) {
     enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
   } else if (stalls(inputs, (request_.goal_O - inputs.odometry.X_OB.p).norm(),
                     config_.takeoff_timeout_s)) {
-    end_stuck(inputs.armed ? "takeoff: height not reached" : "takeoff: not armed");
+    const std::string cause = inputs.armed ? "takeoff: height not reached" : "takeoff: not armed";
+    end_stuck(inputs.trouble.empty() ? cause : cause + ": " + std::string(inputs.trouble));
     enter(inputs.armed ? MissionState::kLand : MissionState::kDone, inputs);
   }
 }
@@ -150,6 +152,29 @@ void Mission::watch_odometry(const Inputs& inputs) {
     inside_since_ = -1;
     progress_.begin(inputs.now);
   }
+}
+
+// Blind it flies on by what it remembers, and its odometry by the IMU alone: it stops while both
+// are still good.
+void Mission::watch_sight(const Inputs& inputs) {
+  const bool moves = state_ == MissionState::kEntry || state_ == MissionState::kFly ||
+                     state_ == MissionState::kExplore || state_ == MissionState::kReturn;
+  if (moves && !blind_ && inputs.armed && inputs.blind_s >= config_.blind_hold_s) {
+    events_(EventKind::kRecovery, "lidar silent: comes to rest");
+    begin_hold({OperatorCommand::Kind::kHold, Vec3::Zero()}, inputs);
+    blind_ = true;
+  } else if (blind_ && state_ == MissionState::kHold && inputs.blind_s < config_.blind_hold_s) {
+    events_(EventKind::kRecovery, "lidar is back: goes on");
+    blind_ = false;
+    resume(inputs);
+  } else if (blind_ && state_ == MissionState::kHold && inputs.blind_s >= config_.blind_land_s) {
+    events_(EventKind::kRecovery, "lidar silent: lands");
+    end_stuck("lidar silent");
+    lands_blind_ = true;
+    request_.goal_O = inputs.odometry.X_OB.p;
+    enter(MissionState::kLand, inputs);
+  }
+  if (state_ != MissionState::kHold && state_ != MissionState::kLost) blind_ = false;
 }
 
 void Mission::enter(MissionState state, const Inputs& inputs) {
@@ -458,6 +483,7 @@ void Mission::obey(const Inputs& inputs) {
     return;
   }
   events_(EventKind::kOperator, name);
+  blind_ = false;  // the operator's word counts
   resumes ? resume(inputs) : begin_hold(*command, inputs);
 }
 

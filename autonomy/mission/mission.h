@@ -71,6 +71,10 @@ struct MissionConfig {
   std::vector<double> yaw_rates_radps{1, 2, 3};  ///< of a yaw burst, one after the other
   double yaw_burst_s = 4.0;                      ///< length of each
   double lost_hover_s = 1.0;  ///< without odometry: level at hover thrust, then down
+  /// Without a scan for longer it comes to rest while it still knows where it is: a third of what
+  /// the odometry lasts without one.
+  double blind_hold_s = 1.0;
+  double blind_land_s = 2.5;  ///< and lands, before an odometry without scans is lost (3 s)
   LandingConfig landing;
   LinkConfig link;
 
@@ -106,9 +110,12 @@ struct MissionConfig {
     f("yaw_burst_s", yaw_burst_s, "length of each yaw burst; a rest of the same length follows");
     f("lost_hover_s", lost_hover_s,
       "level at hover thrust without odometry, then the autopilot lands");
+    f("blind_hold_s", blind_hold_s, "without a LiDAR scan for so long it comes to rest and waits");
+    f("blind_land_s", blind_land_s, "after so long it lands");
     f("landing", landing, "where it may come down");
     f.check(yaw_burst_s >= 0.001, "yaw_burst_s >= 0.001 (a tick)");
     f.check(lost_hover_s >= 0, "lost_hover_s >= 0");
+    f.check(blind_hold_s > 0 && blind_land_s >= blind_hold_s, "0 < blind_hold_s <= blind_land_s");
     f.check(takeoff_height_m > 0, "takeoff_height_m > 0");
     f.check(arrival_radius_m > 0, "arrival_radius_m > 0");
     f.check(arrival_speed_mps > 0, "arrival_speed_mps > 0");
@@ -168,7 +175,9 @@ class Mission {
     std::string_view cause;                               ///< why it failed
     bool leg_blocked = false;                             ///< something stands in the way of a kLeg
     LandingGround below = LandingGround::kUnknown;        ///< where it would come down
-    bool at_reserve = false;  ///< of the battery: what is left is needed to land
+    bool at_reserve = false;   ///< of the battery: what is left is needed to land
+    std::string_view trouble;  ///< the newest fault of sensors or vehicle that is not over
+    double blind_s = 0;        ///< since the LiDAR's newest scan
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);
@@ -218,6 +227,7 @@ class Mission {
   void select_waypoint(std::size_t index, Stamp now);
   void spin(const Inputs& inputs);
   void watch_odometry(const Inputs& inputs);
+  void watch_sight(const Inputs& inputs);
   void watch_link(const Inputs& inputs);
   void obey(const Inputs& inputs);
   void begin_hold(const OperatorCommand& command, const Inputs& inputs);
@@ -260,6 +270,8 @@ class Mission {
   OperatorCommand asked_;                   ///< what a hold is for
   MissionState held_ = MissionState::kFly;  ///< what it interrupted
   MotionRequest held_request_;
+  bool blind_ = false;        ///< what it holds for
+  bool lands_blind_ = false;  ///< it knew that its odometry would not last
   int orders_ = 0;
   bool home_in_reach_ = true;
 };

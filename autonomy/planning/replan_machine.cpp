@@ -342,6 +342,15 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
     request.previous = &current_.spline;
     request.previous_time_s = current_.time(begin);
   }
+  // The paper's program judges by the inflated cell that it is in, and knows no way out of it.
+  if (!config_.recovers && is_blocked(grid, request.start.p)) {
+    last_plan_ = {};
+    last_plan_.status = PlanStatus::kStartInInflation;
+    counts_.add(last_plan_);
+    report(PlannerEventKind::kPlanFailed, now, StuckCause::kStartInInflation);
+    return false;
+  }
+  const bool was_inside = last_plan_.diagnostics.start_inflated;
   bool final_target = false;
   for (const double share : kShorter) {
     request.goal = local_target(grid, request.start.p, share * config_.horizon_m);
@@ -353,6 +362,9 @@ bool ReplanMachine::try_plan(const GridView& grid, const Odometry& odometry, Sta
     if (last_plan_.ok() || final_target || !shorter_helps || !from_rest) break;
   }
   counts_.add(last_plan_);
+  if (last_plan_.diagnostics.start_inflated && !was_inside) {  // the plan leads out of it
+    report(PlannerEventKind::kEscape, now, StuckCause::kStartInInflation);
+  }
   if (!last_plan_.ok()) {
     report(PlannerEventKind::kPlanFailed, now, cause_of(last_plan_.status));
     return false;
@@ -376,12 +388,14 @@ void ReplanMachine::recover(const GridView& grid, const Odometry& odometry, Stam
   const Stamp begin = now + from_seconds(config_.planning_latency_s);
   const MotionState start = state_at(begin, odometry);
   if (cause == StuckCause::kStartInInflation) {
-    if (recoveries_[0] < kMaxEscapes && try_escape(grid, start, begin, now)) return;
+    if (config_.recovers && recoveries_[0] < kMaxEscapes && try_escape(grid, start, begin, now))
+      return;
   } else if (++tries_ < config_.tries_per_recovery) {
     return;  // the next tick brings a newer grid and another seed
   }
   tries_ = 0;
-  const bool may_retreat = recoveries_[1] < kMaxRetreats || is_trapped(grid, start);
+  const bool may_retreat =
+      config_.recovers && (recoveries_[1] < kMaxRetreats || is_trapped(grid, start));
   if (may_retreat && try_back_off(grid, start, begin, now)) return;
   give_up(cause, now);
   enter(ReplanState::kWaitTarget, now);

@@ -53,6 +53,7 @@ struct ReplanConfig {
   double target_timeout_s = 20.0;     ///< without getting nearer along the guide
   int max_detours = 8;                ///< longer guides granted without getting nearer at all
   double degenerate_speed_mps = 0.8;  ///< handed down: caution's fraction of the speed limit
+  bool recovers = true;               ///< false: as the paper, a failed start is the end of it
   int tries_per_recovery = 3;         ///< plans tried before the next rung
   double back_off_m = 2.0;            ///< along the flown path
   double back_off_speed_mps = 0.7;
@@ -73,6 +74,9 @@ struct ReplanConfig {
       "a target is given up after so long without getting nearer to it along the guide");
     f("max_detours", max_detours,
       "how often the way may turn out longer before that must bring the vehicle nearer than ever");
+    f("recovers", recovers,
+      "out of inflation that has closed around it, and back along the flown path; false: it gives "
+      "its target up where it is, as the paper's program does");
     f("tries_per_recovery", tries_per_recovery, "failed plans before the next recovery");
     f("back_off_m", back_off_m, "distance of a retreat along the flown path");
     f("back_off_speed_mps", back_off_speed_mps, "speed of that");

@@ -17,6 +17,7 @@ LidarWatch::Survey LidarWatch::survey(const LidarScan& scan) const {
     if (i < firings) range[i] = point.p_L.norm();
   }
   Survey out;
+  double deviation = 0;
   const auto next = static_cast<std::size_t>(config_.lines);
   const auto same = static_cast<float>(config_.same_surface_fraction);
   const auto spike = static_cast<float>(config_.spike_fraction);
@@ -31,8 +32,12 @@ LidarWatch::Survey LidarWatch::survey(const LidarScan& scan) const {
       ++out.missing;
     } else if (std::abs(range[i] - expected) > spike * expected) {
       ++out.spikes;
+    } else {
+      deviation += std::abs(range[i] - expected);
     }
   }
+  const int others = out.between - out.missing - out.spikes;
+  if (others > 0) out.noise_m = deviation / others;
   return out;
 }
 
@@ -51,7 +56,13 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   spikes_in_a_row_ = spikes ? spikes_in_a_row_ + 1 : 0;
   // What is false does not become usual.
   if (!spikes) usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
-  sound_in_a_row_ = missing_ || spikes || refused_in_a_row_ > 0 ? 0 : sound_in_a_row_ + 1;
+  if (usual_noise_m_ < 0) usual_noise_m_ = s.noise_m;
+  const bool noisy =
+      s.noise_m > config_.noise_m && s.noise_m > config_.noise_factor * usual_noise_m_;
+  noisy_in_a_row_ = noisy ? noisy_in_a_row_ + 1 : 0;
+  if (!noisy) usual_noise_m_ += (s.noise_m - usual_noise_m_) / config_.memory_scans;
+  const bool faulty = missing_ || spikes || noisy || refused_in_a_row_ > 0;
+  sound_in_a_row_ = faulty ? 0 : sound_in_a_row_ + 1;
 }
 
 void LidarWatch::add_matched_share(double share) {
@@ -64,6 +75,7 @@ void LidarWatch::add_matched_share(double share) {
 LidarWatch::State LidarWatch::newest(Stamp now) const {
   if (now - last_scan_ > from_seconds(config_.silent_after_s)) return State::kSilent;
   if (std::max(spikes_in_a_row_, refused_in_a_row_) >= config_.false_scans) return State::kFalse;
+  if (noisy_in_a_row_ >= config_.false_scans) return State::kNoisy;
   return missing_ ? State::kMissing : State::kSound;
 }
 
@@ -80,6 +92,8 @@ std::optional<std::string_view> LidarWatch::update(Stamp now) {
       return "lidar returns missing";
     case State::kFalse:
       return "lidar returns false";
+    case State::kNoisy:
+      return "lidar noisy";
     default:
       return "lidar sound again";
   }

@@ -19,6 +19,8 @@ struct LidarWatchConfig {
   double missing_share = 0.15;
   double false_share = 0.05;
   double refused_fraction = 0.75;
+  double noise_factor = 2.5;
+  double noise_m = 0.03;
   double memory_scans = 20;
   int false_scans = 3;
   int sound_scans = 3;
@@ -39,6 +41,9 @@ struct LidarWatchConfig {
       "false: 0.07)");
     f("refused_fraction", refused_fraction,
       "less than this share of the usual matched share: returns are false");
+    f("noise_factor", noise_factor,
+      "firings between returns of one surface that lie this much further off it than usual: noisy");
+    f("noise_m", noise_m, "and further than this in the mean (sound: 0.01 to 0.02)");
     f("memory_scans", memory_scans, "over which the usual shares are averaged");
     f("false_scans", false_scans,
       "in a row before returns are called false: a turn among shrubs makes one or two look so");
@@ -47,6 +52,7 @@ struct LidarWatchConfig {
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");
     f.check(false_scans >= 1 && sound_scans >= 1, "false_scans >= 1, sound_scans >= 1");
     f.check(firing_period_s >= 1e-7 && firing_period_s <= 1e-3, "1e-7 <= firing_period_s <= 1e-3");
+    f.check(noise_factor > 1 && noise_m > 0, "noise_factor > 1, noise_m > 0");
     f.check(lines >= 1 && lines <= 1000, "1 <= lines <= 1000");
     f.check(least_points >= 1, "least_points >= 1");
   }
@@ -62,8 +68,9 @@ class LidarWatch {
   /// What the firings between returns of one surface did.
   struct Survey {
     int between = 0;
-    int missing = 0;  ///< no return
-    int spikes = 0;   ///< a return elsewhere
+    int missing = 0;     ///< no return
+    int spikes = 0;      ///< a return elsewhere
+    double noise_m = 0;  ///< mean deviation of the others from the surface
   };
   [[nodiscard]] Survey survey(const LidarScan& scan) const;
 
@@ -72,18 +79,24 @@ class LidarWatch {
   void add_matched_share(double share);
   /// @return what changed since the last call, for an event.
   std::optional<std::string_view> update(Stamp now);
+  /// How long there has been no scan; 0 before the first.
+  [[nodiscard]] double silent_s(Stamp now) const {
+    return last_scan_ < 0 ? 0 : to_seconds(now - last_scan_);
+  }
 
  private:
-  enum class State : std::uint8_t { kSound, kSilent, kMissing, kFalse };
+  enum class State : std::uint8_t { kSound, kSilent, kMissing, kFalse, kNoisy };
 
   [[nodiscard]] State newest(Stamp now) const;
 
   LidarWatchConfig config_;
   Stamp last_scan_ = -1;       ///< with returns; none yet: -1
   double usual_spikes_ = -1;   ///< share; none yet: -1
+  double usual_noise_m_ = -1;  ///< of the ranges; none yet: -1
   double usual_matched_ = -1;  ///< share of the scan's points; none yet: -1
   bool missing_ = false;       ///< in the newest scan
   int spikes_in_a_row_ = 0;    ///< scans
+  int noisy_in_a_row_ = 0;     ///< scans
   int refused_in_a_row_ = 0;   ///< scans
   int sound_in_a_row_ = 0;
   State state_ = State::kSound;  ///< as told

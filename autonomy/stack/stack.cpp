@@ -1,6 +1,7 @@
 #include "stack/stack.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "stack/modules.h"
@@ -10,6 +11,30 @@ namespace {
 
 // An estimate comes with every sample of a 200 Hz IMU: one that has stopped is none.
 constexpr Stamp kOdometryStale = kNanosecondsPerSecond / 10;
+
+/// Whether one scan's points are the other's, bit for bit.
+bool is_same(const LidarScan& a, const LidarScan& b) {
+  return !a.points.empty() && a.points.size() == b.points.size() &&
+         a.points.front().p_L == b.points.front().p_L && a.points.back().p_L == b.points.back().p_L;
+}
+
+/// Whether an event says that a fault has ended.
+bool is_over(std::string_view detail) {
+  return detail.ends_with("again") || detail.ends_with("any more") || detail.ends_with("over");
+}
+
+/// The first trouble that is not over: what came after it is more likely its consequence.
+std::string trouble_after(std::string trouble, EventKind kind, const std::string& detail) {
+  std::string name;
+  if (kind == EventKind::kVibration) name = "vibration";
+  if (kind == EventKind::kSensorFault || kind == EventKind::kVehicleFault) {
+    name = detail.substr(0, detail.find(':'));
+  }
+  if (name.empty()) return trouble;
+  if (!is_over(detail)) return trouble.empty() ? name : trouble;
+  const std::string whose = name.substr(0, name.find(' '));
+  return trouble.starts_with(whose) ? std::string() : trouble;
+}
 
 /// What a scenario says under `modules` of a module.
 ConfigNode own_parameters(const StackConfig& config, const std::string& name) {
@@ -43,6 +68,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       may_fly_(std::max<std::size_t>(1, config_.odometry.failover.size())),
       switch_(config_.odometry.handover, may_fly_),
       lidar_watch_(config_.odometry.watch),
+      health_watch_(config_.health),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
       explorer_(make(modules().explorers, config_.exploration.strategy, config_, seed)),
@@ -87,6 +113,7 @@ Stack::Source Stack::make_source(const std::string& name, const std::string& lan
 }
 
 void Stack::add_imu(const ImuSample& imu) {
+  health_watch_.add_imu(now_, imu);
   for (Source& source : sources_) {
     source.odometry->add_imu(imu);
     collect(source);
@@ -94,13 +121,17 @@ void Stack::add_imu(const ImuSample& imu) {
   choose_source();
 }
 
-void Stack::add_autopilot(const AutopilotStatus& status) { autopilot_ = status; }
+void Stack::add_autopilot(const AutopilotStatus& status) {
+  autopilot_ = status;
+  for (const Event& notice : status.notices) report(notice.kind, notice.detail);
+}
 
 void Stack::add_battery(const BatterySample& battery) {
   energy_.add(battery, odometry_.v_OB.norm(), !autopilot_.landed);
 }
 
 void Stack::add_mocap(const MocapSample& mocap) {
+  health_watch_.add_mocap(now_, mocap);
   for (Source& source : sources_) {
     source.odometry->add_mocap(mocap);
     collect(source);
@@ -108,10 +139,16 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
+  health_watch_.add_scan(now_, *scan);
   if (!scan->device.empty()) {  // for the maps only
     if (config_.mapping.takes(scan->device)) perception_.add_scan(now_, *scan);
     return;
   }
+  // A device that hangs goes on sending what it saw last: in the air that is as good as nothing,
+  // and worse for who believes it.
+  const bool repeats = last_scan_ && !autopilot_.landed && is_same(*scan, *last_scan_);
+  last_scan_ = scan;
+  if (repeats) return;
   lidar_watch_.add_scan(now_, *scan);
   for (Source& source : sources_) start(source, source.odometry->add_scan(scan));
   if (!flying().odometry->places_scans()) perception_.add_scan(now_, *scan);
@@ -162,7 +199,10 @@ void Stack::collect(Source& source) {
   }
 }
 
-void Stack::add_depth(const DepthImagePtr& depth) { perception_.add_depth(now_, depth); }
+void Stack::add_depth(const DepthImagePtr& depth) {
+  health_watch_.add_depth(now_, *depth);
+  perception_.add_depth(now_, depth);
+}
 
 bool Stack::accepts_depth(const std::string& device, Stamp stamp) {
   Stamp& next = next_depth_[device];
@@ -214,9 +254,7 @@ OdometryNeed Stack::odometry_need() const {
 std::optional<AttitudeCommand> Stack::tick() {
   if (now_ < next_control_) return std::nullopt;
   next_control_ += control_period_;
-  if (const auto fault = lidar_watch_.update(now_)) {
-    report(EventKind::kSensorFault, std::string(*fault));
-  }
+  watch_health();
   if (perception_.take_cloud_cut()) {
     report(EventKind::kMapFull, "mapping.cloud.max_points is reached, later points are left out");
   }
@@ -224,12 +262,32 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ = mission_.update(
-      {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
-       serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
-       !navigating_ && legs_.blocked(), ground_below(), at_reserve()});
+  request_ =
+      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
+                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
+                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below(),
+                       at_reserve(), trouble_, lidar_watch_.silent_s(now_)});
   setpoint_ = move(request_);
   return control(request_);
+}
+
+void Stack::watch_health() {
+  if (const auto fault = lidar_watch_.update(now_)) {
+    report(EventKind::kSensorFault, std::string(*fault));
+  }
+  HealthWatch::Flight flight;
+  flight.armed = autopilot_.armed;
+  flight.in_air = autopilot_.armed && !autopilot_.landed;
+  const bool located = odometry_.status == OdometryStatus::kOk;
+  if (located) {
+    const Vec3 up_B = odometry_.X_OB.R.row(2), autopilot_up_B = autopilot_.attitude.R_AB.row(2);
+    flight.attitude_difference_rad =
+        std::atan2(up_B.cross(autopilot_up_B).norm(), up_B.dot(autopilot_up_B));
+  }
+  // A landing aims below the ground.
+  const bool on_a_path = located && request_.kind != MotionRequest::Kind::kLand;
+  if (on_a_path) flight.off_path_m = (setpoint_.p_OB - odometry_.X_OB.p).norm();
+  for (const Event& event : health_watch_.update(now_, flight)) report(event.kind, event.detail);
 }
 
 void Stack::decide() {
@@ -338,6 +396,7 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
 }
 
 void Stack::report(EventKind kind, const std::string& detail) {
+  trouble_ = trouble_after(std::move(trouble_), kind, detail);
   events_.push_back({now_, kind, detail});
 }
 

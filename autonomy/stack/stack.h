@@ -12,6 +12,7 @@
 #include "mission/mission.h"
 #include "odometry/odometry_source.h"
 #include "stack/flight_software.h"
+#include "stack/health_watch.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 #include "stack/navigator.h"
@@ -77,6 +78,7 @@ class Stack : public FlightSoftware {
   /// Hands over to another source when the flying one has failed, or back.
   void choose_source();
   void report(EventKind kind, const std::string& detail);
+  void watch_health();
   void set_odometry(const Odometry& odometry);
   [[nodiscard]] bool jumps_to(const Odometry& odometry) const;
   /// The pose has jumped: the map around the vehicle and the way through it begin anew.
@@ -102,6 +104,9 @@ class Stack : public FlightSoftware {
   std::size_t may_fly_ = 1;      ///< so many of them, from the first on
   OdometrySwitch switch_;
   LidarWatch lidar_watch_;
+  LidarScanPtr last_scan_;  ///< of the first LiDAR
+  HealthWatch health_watch_;
+  std::string trouble_;  ///< the first fault that has not been said to be over
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;

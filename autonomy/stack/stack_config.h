@@ -22,6 +22,7 @@
 #include "odometry/visual/visual_inertial_config.h"
 #include "planning/guide_path.h"
 #include "planning/replan_machine.h"
+#include "stack/health_watch_config.h"
 #include "stack/leg_motion.h"
 #include "stack/lidar_watch.h"
 #include "stack/odometry_switch.h"
@@ -194,6 +195,7 @@ struct StackConfig {
   MissionConfig mission;
   TimedPathConfig path;
   CautionConfig caution;
+  HealthWatchConfig health;
   TrackerConfig control;
   std::vector<std::string> plugins;
   std::map<std::string, ModuleSection> modules;
@@ -212,6 +214,7 @@ struct StackConfig {
     f("mission", mission, "what to do");
     f("path", path, "timed paths along straight legs");
     f("caution", caution, "answers to a weak odometry");
+    f("health", health, "what it calls wrong with its sensors and its flight");
     f("control", control, "trajectory tracking");
     f("plugins", plugins, "shared libraries with modules of yours (autonomy/stack/modules.h)");
     f("modules", modules, "parameters of these modules, by their names");

@@ -203,6 +203,7 @@ Physics::~Physics() = default;
 Physics::Physics(Physics&&) noexcept = default;
 Physics& Physics::operator=(Physics&&) noexcept = default;
 
+void Physics::set_faults(const DriveFaults& faults) { impl_->powertrain_.set_faults(faults); }
 void Physics::step(const MotorCommand& command) { impl_->step(command, nullptr); }
 void Physics::step(const MotorCommand& command, const CarriedMotion& carry) {
   impl_->step(command, &carry);

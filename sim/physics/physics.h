@@ -42,6 +42,9 @@ class Physics {
   Physics(Physics&&) noexcept;
   Physics& operator=(Physics&&) noexcept;
 
+  /// What is broken of the drive from now on.
+  void set_faults(const DriveFaults& faults);
+
   /// Holds `command` for one tick.
   /// @throws std::runtime_error if MuJoCo's state diverges.
   void step(const MotorCommand& command);

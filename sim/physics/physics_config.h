@@ -3,6 +3,7 @@
 #include "math/pose.h"
 #include "math/so3.h"
 #include "math/types.h"
+#include "physics/flexible_frame.h"
 
 /// Parameters of the simulated vehicle that are not geometry or mass (those stand in
 /// models/arex/arex.xml). Sources: models/arex/README.md. [S] sourced, [E] estimated, [P] paper.
@@ -194,6 +195,7 @@ struct PhysicsConfig {
   MotorConfig motor;
   RotorConfig rotor;
   BatteryConfig battery;
+  FrameConfig frame;
   DragConfig drag;
   WindConfig wind;
   ContactConfig contact;
@@ -207,6 +209,7 @@ struct PhysicsConfig {
     f("motor", motor, "motor and speed controller");
     f("rotor", rotor, "propeller");
     f("battery", battery, "battery");
+    f("frame", frame, "how the airframe gives way");
     f("drag", drag, "airframe drag");
     f("wind", wind, "wind and gusts");
     f("contact", contact, "contact with the world");

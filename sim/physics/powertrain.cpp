@@ -31,11 +31,11 @@ double Powertrain::open_circuit_v() const {
   } else {
     cell_v = line(charge_, -battery_.empty_tail_fraction, 0, 0, battery_.cell_empty_v);
   }
-  return battery_.cells * std::max(cell_v, 0.0);
+  return std::max(battery_.cells * std::max(cell_v, 0.0) - faults_.lost_voltage_v, 0.0);
 }
 
 double Powertrain::motor_current(double throttle, double bus_v, double speed) const {
-  if (browned_out_) return 0;
+  if (browned_out_ || throttle == kOpen) return 0;
   const double current =
       (throttle * bus_v - motor_.torque_constant_nm_per_a * speed) / motor_.resistance_ohm;
   return std::clamp(current, -motor_.current_limit_a, motor_.current_limit_a);
@@ -49,6 +49,7 @@ Powertrain::Load Powertrain::load(const std::array<double, 4>& throttle, double 
   if (bus_v > motor_.brownout_voltage_v) total.slope = -total.current_a / bus_v;
   if (browned_out_) return total;
   for (std::size_t i = 0; i < kRotors; ++i) {
+    if (throttle[i] == kOpen) continue;
     const double current = motor_current(throttle[i], bus_v, speed_[i]);
     // A braking motor feeds the bus, and the controller takes its share of that too.
     const double gain =
@@ -75,8 +76,8 @@ double Powertrain::solve_bus_voltage(const std::array<double, 4>& throttle) cons
   double bus_v = std::min(state_.voltage_v, open_circuit);
   for (int iteration = 0; iteration < 8; ++iteration) {
     const Load at = load(throttle, bus_v);
-    const double residual = open_circuit - battery_.resistance_ohm * at.current_a - bus_v;
-    const double change = residual / (1 + battery_.resistance_ohm * at.slope);
+    const double residual = open_circuit - battery_ohm() * at.current_a - bus_v;
+    const double change = residual / (1 + battery_ohm() * at.slope);
     bus_v = std::max(bus_v + change, 0.0);
     if (std::abs(change) < 1e-10) break;
   }
@@ -98,12 +99,30 @@ double Powertrain::speed_after_tick(double throttle, double bus_v, double speed)
   return std::max(0.0, speed + kSecondsPerTick / 6 * (k1 + 2 * k2 + 2 * k3 + k4));
 }
 
+// A weak motor turns as slowly as a sound one would at the throttle that this gives: speeds are
+// nearly proportional to the voltage, thrust to their square.
+double Powertrain::faulty_throttle(std::size_t motor, double throttle) const {
+  if (faults_.stopped[motor]) return kOpen;
+  const double share = faults_.thrust_share[motor];
+  if (share == 1) return throttle;
+  const double kt = motor_.torque_constant_nm_per_a;
+  const double bend =
+      motor_.resistance_ohm * rotor_.thrust_coefficient * rotor_.torque_ratio_m / kt;
+  const double lost_v = motor_.resistance_ohm * motor_.no_load_current_a;
+  const double volts = std::max(throttle * state_.voltage_v - lost_v, 0.0);
+  const double speed = (std::sqrt(kt * kt + 4 * bend * volts) - kt) / (2 * bend);
+  const double weak = std::sqrt(share) * speed;
+  const double wanted_v = kt * weak + bend * weak * weak + lost_v;
+  return state_.voltage_v > 0 ? std::min(throttle, wanted_v / state_.voltage_v) : throttle;
+}
+
 void Powertrain::step(const MotorCommand& command) {
   std::array<double, kRotors> throttle{};
   bool all_zero = true;
   for (std::size_t i = 0; i < kRotors; ++i) {
     throttle[i] = std::clamp(command.throttle[i], 0.0, 1.0);
     all_zero = all_zero && throttle[i] == 0;
+    throttle[i] = faulty_throttle(i, throttle[i]);
   }
 
   double bus_v = solve_bus_voltage(throttle);
@@ -116,9 +135,8 @@ void Powertrain::step(const MotorCommand& command) {
   }
 
   // From V = E - R_b I rather than from the load, so that charge and energy close exactly.
-  state_.current_a = battery_.resistance_ohm > 0
-                         ? (open_circuit_v() - bus_v) / battery_.resistance_ohm
-                         : load(throttle, bus_v).current_a;
+  state_.current_a = battery_ohm() > 0 ? (open_circuit_v() - bus_v) / battery_ohm()
+                                       : load(throttle, bus_v).current_a;
   state_.voltage_v = bus_v;
   state_.used_wh += bus_v * state_.current_a * kSecondsPerTick / kSecondsPerHour;
   charge_ -= state_.current_a * kSecondsPerTick / (battery_.capacity_ah * kSecondsPerHour);

@@ -14,6 +14,15 @@ struct BatteryState {
   double used_wh = 0;          ///< delivered at the terminals
 };
 
+/// What is broken of the drive. As made: nothing is.
+struct DriveFaults {
+  /// Of each motor's static thrust at a throttle, what it still gives: 1 all of it.
+  std::array<double, 4> thrust_share{1, 1, 1, 1};
+  std::array<bool, 4> stopped{};  ///< its controller gives no current
+  double added_resistance_ohm = 0;
+  double lost_voltage_v = 0;  ///< of the open circuit
+};
+
 /// Battery, speed controllers, motors and rotor speeds: throttle in, rotor speeds out.
 ///
 /// Motor: u V = Kt w + R i, limited to +-i_max; J dw/dt = Kt (i - I0) - kQ w^2. The bus voltage
@@ -22,6 +31,9 @@ struct BatteryState {
 class Powertrain {
  public:
   Powertrain(const MotorConfig& motor, const RotorConfig& rotor, const BatteryConfig& battery);
+
+  /// Holds until they are set anew.
+  void set_faults(const DriveFaults& faults) { faults_ = faults; }
 
   /// Advances by one tick (1 ms).
   void step(const MotorCommand& command);
@@ -39,19 +51,27 @@ class Powertrain {
   void set_rotor_radps(const std::array<double, 4>& speed) { speed_ = speed; }
 
  private:
+  static constexpr double kOpen = -1;  ///< the throttle of a controller that has stopped
+
   /// What the bus has to deliver at one voltage, and how that changes with it (A, A/V).
   struct Load {
     double current_a = 0;
     double slope = 0;
   };
+  /// @param throttle kOpen: the controller gives none
   [[nodiscard]] double motor_current(double throttle, double bus_v, double speed) const;
+  [[nodiscard]] double faulty_throttle(std::size_t motor, double throttle) const;
   [[nodiscard]] Load load(const std::array<double, 4>& throttle, double bus_v) const;
+  [[nodiscard]] double battery_ohm() const {
+    return battery_.resistance_ohm + faults_.added_resistance_ohm;
+  }
   [[nodiscard]] double solve_bus_voltage(const std::array<double, 4>& throttle) const;
   [[nodiscard]] double speed_after_tick(double throttle, double bus_v, double speed) const;
 
   MotorConfig motor_;
   RotorConfig rotor_;
   BatteryConfig battery_;
+  DriveFaults faults_;
   BatteryState state_;
   double charge_ = 1;  ///< may fall below 0 by the empty tail
   bool browned_out_ = false;

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "report/outcome_matrix.h"
 #include "report/overlay.h"
 #include "report/page.h"
 #include "report/payload.h"
@@ -269,6 +270,7 @@ std::string comparison_report_html(const ResultTable& results, const std::string
       "this page does not.</p></noscript>\n";
   html += "<section id=\"figures\"></section>\n<section id=\"coverage\"></section>\n";
   html += overlaid_paths_html(results, overlay);
+  html += outcomes_html(results);
   html += failures_html(results, directory);
   html += "<section id=\"side\"></section>\n";
   html += "<section id=\"runs\">" + runs_html(results, directory) + "</section>\n";

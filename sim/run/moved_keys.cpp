@@ -42,6 +42,9 @@ constexpr std::array kMovedKeys{
     MovedKey{"imu.vibration.blade_pass_mps2", kVibration},
     MovedKey{"imu.vibration.broadband_mps2", kVibration},
     MovedKey{"imu.vibration.gyro_radps", kVibration},
+    MovedKey{"imu.vibration.frame_mode_hz", "physics.frame.mode_hz"},
+    MovedKey{"imu.vibration.frame_mode_damping", "physics.frame.mode_damping"},
+    MovedKey{"imu.vibration.frame_coupling", "physics.frame.load_ratio"},
     MovedKey{"depth.noise_kernel_px", "depth.noise_grid_px"},
     MovedKey{"world.vehicle_radius_m", "nothing: the radius is the model's (models/arex/arex.xml)"},
 };

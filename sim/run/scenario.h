@@ -24,6 +24,7 @@
 #include "scoring/world_complexity.h"
 #include "semantics/pcl_models.h"
 #include "semantics/semantic_config.h"
+#include "sensors/fault.h"
 #include "sensors/imu.h"
 #include "sensors/infrared_config.h"
 #include "sensors/mocap_device.h"
@@ -82,6 +83,7 @@ struct ScenarioConfig {
   InfraredConfig infrared;
   MocapConfig mocap;
   std::map<std::string, DeviceSection> devices;
+  std::vector<FaultConfig> faults;
   AutopilotConfig autopilot;
   StackConfig stack;
   std::vector<OperatorOrder> commands;
@@ -101,6 +103,11 @@ struct ScenarioConfig {
     f("devices", devices,
       "further ones by name: {type: mid360|spinning|d430, position_m: [..], rotation_rad: [..], "
       "...}");
+    f("faults", faults,
+      "what goes wrong: [{device: lidar, kind: silent, from_s: 20, to_s: 25}, ...]; device: imu|"
+      "magnetometer|barometer|power|lidar|depth|mocap|a name under devices|motor|esc|battery, "
+      "kind: silent|stuck|delayed|noisy|dropping|false_returns|jumping|blinded|weak|stop, and the "
+      "amounts of README's table");
     f("autopilot", autopilot, "flight controller");
     stack.fields(f);
     f("commands", commands,
@@ -116,6 +123,11 @@ struct ScenarioConfig {
         "ones have");
     f.check(stack.mapping.lidar.empty() || devices.contains(stack.mapping.lidar),
             "mapping.lidar empty, or a name under devices");
+    for (const FaultConfig& fault : faults) {
+      f.check(faulty_part(fault.device) != FaultyPart::kFurther || devices.contains(fault.device),
+              "faults of known devices: '" + fault.device +
+                  "' is neither one of the vehicle's nor one under devices");
+    }
     f.check(
         stack.mapping.enabled || std::none_of(commands.begin(), commands.end(), needs_a_planner),
         "mapping.enabled true, or commands without return and go_to, which are planned ways");

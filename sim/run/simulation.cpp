@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "run/device_types.h"
+#include "run/drive_faults.h"
 #include "run/perfect_tracking.h"
 #include "sensors/board_device.h"
 #include "sensors/mocap_device.h"
@@ -79,12 +80,15 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       world_(scenario.build_world()),
       scene_(world_, threads > 1 ? Scene::Build::kBeside : Scene::Build::kNow),
       physics_(config_.physics, world_, start_pose(world_), config_.seed),
+      frame_(config_.physics.frame, physics_.airframe(), config_.seed),
       autopilot_(config_.autopilot, config_.stack.vehicle),
       previous_truth_(physics_.truth()),
       scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
               ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
+      fault_log_(config_.faults),
       jobs_(threads),
-      operator_(config_.operator_link, config_.commands, config_.seed) {
+      operator_(config_.operator_link, config_.commands, config_.seed),
+      drive_faulty_(concern_drive(config_.faults)) {
   add_devices();
   stack_ = std::make_unique<Stack>(config_.stack, jobs_, config_.seed);
   outlets_.software = stack_.get();
@@ -99,7 +103,8 @@ void Simulation::add_devices() {
   const auto context = [&](const std::string& name, const Pose& X_BS) {
     const std::uint64_t seed =
         name.empty() ? config_.seed : RandomStream(config_.seed, "device " + name).bits();
-    return DeviceContext{name, world_, scene_, airframe, X_BS, jobs_, outlets_, seed};
+    return DeviceContext{name,  world_,   scene_, airframe,      X_BS,
+                         jobs_, outlets_, seed,   config_.faults};
   };
   const auto add = [&](const std::string& name, std::unique_ptr<Device> device) {
     if (device) devices_.emplace_back(name, std::move(device));
@@ -140,7 +145,11 @@ bool Simulation::tick() {
 
 void Simulation::fire_devices() {
   const StageTimer::Scope timed(timers_.devices);
-  const Moment moment{now_, physics_.truth(), previous_truth_, physics_.battery()};
+  // All that senses sits on the plate.
+  if (!frame_.stiff()) frame_.step(physics_.truth());
+  const Truth& now = frame_.stiff() ? physics_.truth() : frame_.plate();
+  const Truth& before = frame_.stiff() ? previous_truth_ : frame_.plate_before();
+  const Moment moment{now_, now, before, physics_.battery()};
   for (const auto& [name, device] : devices_) device->fire(moment);
 }
 
@@ -150,7 +159,7 @@ void Simulation::run_stack() {
   if (now_ % kStatusPeriod == 0) {
     stack_->add_autopilot({autopilot_.attitude(), autopilot_.state() == AutopilotState::kStandby,
                            autopilot_.armed(), autopilot_.state() > AutopilotState::kSpinUp,
-                           autopilot_.landed()});
+                           autopilot_.landed(), autopilot_.take_notices()});
   }
   for (const OperatorMessage& message : operator_.deliver(now_)) stack_->add_operator(message);
   const auto command = stack_->tick();
@@ -182,6 +191,7 @@ std::optional<CarriedMotion> Simulation::carried_motion() const {
 void Simulation::step_physics() {
   const StageTimer::Scope timed(timers_.physics);
   previous_truth_ = physics_.truth();
+  if (drive_faulty_) physics_.set_faults(drive_faults_at(config_.faults, now_));
   if (const auto motion = carried_motion()) {
     physics_.step(motors_, *motion);
   } else {
@@ -204,6 +214,7 @@ void Simulation::record() {
       scorer_.target_reached(truth, view);
       exploration_.reached += view.state == MissionState::kExplore;
     }
+    fault_log_.add(event);
     operator_.report(event);
     if (recorder_) recorder_->event(event);
   }
@@ -370,6 +381,7 @@ FlightResult Simulation::finish() {
     compare_with_the_possible(result);
   }
   result.exploration = exploration_;
+  result.faults = fault_log_;
   result.plans = view.plans;
   if (recorder_ && config_.stack.mapping.enabled) {
     recorder_->write_maps(stack_->mapper());

@@ -10,7 +10,9 @@
 #include "autopilot/autopilot.h"
 #include "jobs/job_queue.h"
 #include "math/fingerprint.h"
+#include "physics/flexible_frame.h"
 #include "physics/physics.h"
+#include "run/fault_log.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
 #include "run/stage_timer.h"
@@ -68,6 +70,7 @@ struct FlightResult {
   std::optional<WorldComplexity> complexity;  ///< of explorations
   ExplorationLog exploration;
   PlanCounts plans;
+  FaultLog faults{{}};
   BatteryState battery;
   std::string renderer;  ///< of the depth frames; empty if none was read
   std::vector<TimingRow> timing;
@@ -132,6 +135,7 @@ class Simulation {
   worlds::World world_;
   Scene scene_;
   Physics physics_;
+  FlexibleFrame frame_;
   Autopilot autopilot_;
   Recorder* recorder_ = nullptr;
 
@@ -148,6 +152,7 @@ class Simulation {
   std::vector<CloudGrowth> cloud_growth_;     ///< in jobs of the cloud's lane
   double area_fraction_ = 0;
   ExplorationLog exploration_;
+  FaultLog fault_log_;
   int collisions_ = 0;
   Timers timers_;
 
@@ -156,6 +161,7 @@ class Simulation {
   std::vector<std::pair<std::string, std::unique_ptr<Device>>> devices_;  ///< fired in this order
   std::unique_ptr<FlightSoftware> stack_;
   OperatorLink operator_;
+  bool drive_faulty_;  ///< motors, speed controllers or battery, at some time
 };
 
 }  // namespace arex::sim

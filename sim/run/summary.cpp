@@ -62,6 +62,9 @@ void add_run(const Scenario& scenario, const FlightResult& result, const HostTim
 
 void add_flight(const FlightScore& flight, Figures& figures) {
   figures.set("distance_m", flight.distance_m);
+  figures.set("yaw.turned_rad", flight.yaw.turned_rad());
+  figures.set("yaw.fastest_radps", flight.yaw.fastest_radps());
+  figures.set("yaw.spins", flight.yaw.spins());
   figures.set("tracking.rmse_m", flight.tracking_rmse_m);
   figures.set("tracking.landing_error_m", flight.landing_error_m);
   add_figures(flight.odometry, "odometry", figures);
@@ -138,6 +141,7 @@ ordered_json summarise(const Scenario& scenario, const FlightResult& result, con
   if (result.coverage) add_figures(*result.coverage, figures);
   if (result.semantic) add_figures(*result.semantic, figures);
   result.exploration.add_figures(figures);
+  result.faults.add_figures(figures);
   add_timing(result, kExplorerModule, "exploration", figures);
   add_tour(result, figures);
   return figures.json();

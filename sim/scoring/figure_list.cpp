@@ -48,6 +48,18 @@ std::vector<FigureInfo> run_figures() {
   };
 }
 
+std::vector<FigureInfo> fault_figures() {
+  return {
+      {"faults.events", "faults told", "", kNeither, false,
+       "events sensor_fault, vehicle_fault and vibration, those that say that it is over included"},
+      {"faults.told", "first told of the faults", "", kNeither, false,
+       "the first typed event after the first of the scenario's faults began: its kind and detail; "
+       "null: none, or nothing was to go wrong",
+       Kind::kText},
+      {"faults.told_after_s", "time until then", "s", kLess, false, "since the first fault began"},
+  };
+}
+
 std::vector<FigureInfo> coverage_figures() {
   std::vector<FigureInfo> list{
       {"coverage.area_fraction", "area covered", "1", kMore, true,
@@ -222,6 +234,11 @@ std::vector<FigureInfo> flight_figures() {
       {"tracking.landing_error_m", "landing error", "m", kLess, false,
        "horizontal, resting place against the last target reached; null unless it landed "
        "there"},
+      {"yaw.turned_rad", "turned about the vertical", "rad", kNeither, false,
+       "sum of the true heading's changes"},
+      {"yaw.fastest_radps", "fastest turn", "rad/s", kNeither, false, "about the vertical"},
+      {"yaw.spins", "spins", "", kNeither, false,
+       "turns about the vertical faster than 1.5 rad/s, which planned headings never are"},
       {"clearance.min_m", "least clearance", "m", kMore, true,
        "airframe to the nearest surface on the way, leaves left out; 5 m stand for 5 m and "
        "more"},
@@ -452,8 +469,8 @@ std::vector<T> joined(std::initializer_list<std::vector<T>> parts) {
 
 const std::vector<FigureInfo>& figure_list() {
   static const auto list = joined<FigureInfo>(
-      {run_figures(), coverage_figures(), exploration_figures(), tour_figures(), map_figures(),
-       odometry_source_figures(), odometry_figures("odometry.", true),
+      {run_figures(), fault_figures(), coverage_figures(), exploration_figures(), tour_figures(),
+       map_figures(), odometry_source_figures(), odometry_figures("odometry.", true),
        odometry_figures("odometries.NAME.", false), semantic_figures(), flight_figures()});
   return list;
 }

@@ -56,6 +56,7 @@ OdometryScore FlightScorer::Track::score() const {
 
 void FlightScorer::moved(const Truth& before, const Truth& after) {
   distance_m_ += (after.X_WB.p - before.X_WB.p).norm();
+  yaw_.add(after);
 }
 
 FlightSample FlightScorer::sample(const Truth& truth, const FlightView& view, bool flying,
@@ -133,6 +134,7 @@ double FlightScorer::landing_error(const Truth& truth, const FlightView& view) c
 FlightScore FlightScorer::score(const Truth& truth, const FlightView& view) const {
   FlightScore score;
   score.distance_m = distance_m_;
+  score.yaw = yaw_;
   if (tracking_count_ > 0) {
     score.tracking_rmse_m = std::sqrt(tracking_sum_ / static_cast<double>(tracking_count_));
   }

@@ -12,6 +12,7 @@
 #include "scoring/landing.h"
 #include "scoring/odometry_error.h"
 #include "scoring/thin_branches.h"
+#include "scoring/yaw_meter.h"
 #include "stack/flight_software.h"
 
 namespace arex::sim {
@@ -32,6 +33,7 @@ void add_figures(const std::optional<VisualTally>& tally, const std::string& sec
 /// nothing to measure.
 struct FlightScore {
   double distance_m = 0;
+  YawMeter yaw;
   /// True position against the setpoint, from take-off until it begins to land.
   double tracking_rmse_m = std::numeric_limits<double>::quiet_NaN();
   /// Horizontal, true resting place against the last target, where it landed on that.
@@ -116,6 +118,7 @@ class FlightScorer {
   Track flown_;                          ///< of the source that flies
   std::map<std::string, Track> others_;  ///< of those that run beside
   double distance_m_ = 0;
+  YawMeter yaw_;
   double tracking_sum_ = 0;
   std::size_t tracking_count_ = 0;
   std::size_t grid_count_ = 0;     ///< rows en route with a grid

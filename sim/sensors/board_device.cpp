@@ -1,6 +1,7 @@
 #include "sensors/board_device.h"
 
 #include <array>
+#include <optional>
 
 namespace arex::sim {
 namespace {
@@ -11,27 +12,38 @@ constexpr Stamp kPowerPeriod = 5 * kNanosecondsPerTick;  // 200 Hz
 
 void BoardDevice::fire(const Moment& moment) {
   delivered_ = true;
-  const ImuSample raw = imu_.sample(moment.truth);
-  autopilot_.add_imu(raw);
-  add(raw);
-  if (const auto sample = imu_.output()) {
-    outlets_.software->add_imu(*sample);
-    add(*sample);
-    if (outlets_.bag) outlets_.bag->imu(*sample);
+  const Stamp now = moment.now;
+  const std::optional<ImuSample> raw = imu_.sample(moment.truth);
+  raw_line_.pass(now, raw, [&](const ImuSample& sample) {
+    autopilot_.add_imu(sample);
+    add(sample);
+  });
+  output_line_.pass(now, imu_.output(), [&](const ImuSample& sample) {
+    outlets_.software->add_imu(sample);
+    add(sample);
+    if (outlets_.bag) outlets_.bag->imu(sample);
+  });
+  field_line_.pass(now, imu_.magnetometer(), [&](const MagnetometerSample& sample) {
+    autopilot_.add_magnetometer(sample);
+    fingerprint_.add({sample.field_gauss.data(), 3});
+  });
+  pressure_line_.pass(now, imu_.barometer(), [&](const BarometerSample& sample) {
+    autopilot_.add_barometer(sample);
+    fingerprint_.add({&sample.pressure_pa, 1});
+  });
+  hand_on_power(moment);
+}
+
+void BoardDevice::hand_on_power(const Moment& moment) {
+  std::optional<BatterySample> reading;
+  if (moment.now % kPowerPeriod == 0) {
+    reading = {moment.now, moment.battery.voltage_v, moment.battery.current_a};
   }
-  if (const auto sample = imu_.magnetometer()) {
-    autopilot_.add_magnetometer(*sample);
-    fingerprint_.add({sample->field_gauss.data(), 3});
-  }
-  if (const auto sample = imu_.barometer()) {
-    autopilot_.add_barometer(*sample);
-    fingerprint_.add({&sample->pressure_pa, 1});
-  }
-  if (moment.now % kPowerPeriod != 0) return;
-  const BatterySample power{moment.now, moment.battery.voltage_v, moment.battery.current_a};
-  autopilot_.add_battery(power);
-  outlets_.software->add_battery(power);
-  fingerprint_.add(std::array{power.voltage_v, power.current_a});
+  power_line_.pass(moment.now, reading, [&](const BatterySample& power) {
+    autopilot_.add_battery(power);
+    outlets_.software->add_battery(power);
+    fingerprint_.add(std::array{power.voltage_v, power.current_a});
+  });
 }
 
 void BoardDevice::add(const ImuSample& sample) {

@@ -2,6 +2,7 @@
 
 #include "autopilot/autopilot.h"
 #include "sensors/device.h"
+#include "sensors/faulty_line.h"
 #include "sensors/imu.h"
 
 namespace arex::sim {
@@ -11,14 +12,26 @@ namespace arex::sim {
 class BoardDevice : public Device {
  public:
   BoardDevice(const ImuConfig& config, Autopilot& autopilot, const DeviceContext& context)
-      : imu_(config, context.seed), autopilot_(autopilot), outlets_(context.outlets) {}
+      : imu_(config, context.seed),
+        raw_line_(context.faults, context.seed, "imu", " raw"),
+        output_line_(context.faults, context.seed, "imu"),
+        field_line_(context.faults, context.seed, "magnetometer"),
+        pressure_line_(context.faults, context.seed, "barometer"),
+        power_line_(context.faults, context.seed, "power"),
+        autopilot_(autopilot),
+        outlets_(context.outlets) {}
 
   void fire(const Moment& moment) override;
 
  private:
   void add(const ImuSample& sample);
+  void hand_on_power(const Moment& moment);
 
   ImuModel imu_;
+  FaultyLine<ImuSample> raw_line_, output_line_;
+  FaultyLine<MagnetometerSample> field_line_;
+  FaultyLine<BarometerSample> pressure_line_;
+  FaultyLine<BatterySample> power_line_;
   Autopilot& autopilot_;
   Outlets& outlets_;
 };

@@ -22,9 +22,12 @@ DepthDevice::DepthDevice(const D430Config& config, double latency_s, const Devic
       latency_(from_seconds(latency_s)),
       jobs_(context.jobs),
       lane_(jobs_.add_lane(name_.empty() ? "depth" : name_)),
-      outlets_(context.outlets) {}
+      outlets_(context.outlets),
+      line_(context.faults, context.seed, name_.empty() ? "depth" : name_) {}
 
 void DepthDevice::fire(const Moment& moment) {
+  now_ = moment.now;
+  if (!line_.sound()) pass(std::nullopt);
   // 30 Hz does not divide a millisecond: the shutter opens between two ticks.
   const Stamp stamp = from_seconds(static_cast<double>(frame_) / config_.rate_hz);
   if (stamp > moment.now) return;
@@ -39,12 +42,25 @@ void DepthDevice::fire(const Moment& moment) {
     const std::shared_ptr<DepthImage> frame = camera_->capture(stamp, X_WB);
     frame->device = name_;
     return [this, frame, hash = hash_of(*frame)] {
-      note(hash);
-      outlets_.frames.add(hash);
-      outlets_.software->add_depth(frame);
-      if (outlets_.bag) outlets_.bag->depth(*frame);
+      if (line_.sound()) {
+        hand_on(frame, hash);
+      } else {
+        pass(frame);
+      }
     };
   });
+}
+
+void DepthDevice::pass(const std::optional<DepthImagePtr>& frame) {
+  line_.pass(now_, frame,
+             [this](const DepthImagePtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
+}
+
+void DepthDevice::hand_on(const DepthImagePtr& frame, std::uint64_t hash) {
+  note(hash);
+  outlets_.frames.add(hash);
+  outlets_.software->add_depth(frame);
+  if (outlets_.bag) outlets_.bag->depth(*frame);
 }
 
 }  // namespace arex::sim

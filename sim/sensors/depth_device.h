@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "sensors/d430.h"
 #include "sensors/device.h"
+#include "sensors/faulty_line.h"
 
 namespace arex::sim {
 
@@ -17,6 +19,10 @@ class DepthDevice : public Device {
   void fire(const Moment& moment) override;
 
  private:
+  /// Through the line of a device that is not sound.
+  void pass(const std::optional<DepthImagePtr>& frame);
+  void hand_on(const DepthImagePtr& frame, std::uint64_t hash);
+
   std::string name_;
   D430Config config_;
   const worlds::World& world_;
@@ -26,6 +32,8 @@ class DepthDevice : public Device {
   JobQueue& jobs_;
   JobQueue::Lane lane_;
   Outlets& outlets_;
+  FaultyLine<DepthImagePtr> line_;
+  Stamp now_ = 0;
   std::unique_ptr<D430> camera_;  ///< made when the first frame is read; in jobs of its lane
   std::int64_t frame_ = 0;        ///< index of the next
 };

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "bag/bag_writer.h"
 #include "jobs/job_queue.h"
@@ -10,6 +11,7 @@
 #include "physics/airframe.h"
 #include "physics/powertrain.h"
 #include "physics/truth.h"
+#include "sensors/fault.h"
 #include "sensors/scene.h"
 #include "stack/flight_software.h"
 #include "worlds/world.h"
@@ -43,6 +45,7 @@ struct DeviceContext {
   JobQueue& jobs;
   Outlets& outlets;
   std::uint64_t seed = 0;
+  std::vector<FaultConfig> faults;  ///< of all devices; each looks for its own (FaultyLine)
 };
 
 /// A sensor on the vehicle: asked at every tick whether it measures, it hands its readings on when

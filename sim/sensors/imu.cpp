@@ -46,7 +46,7 @@ ImuSample ImuModel::sample(const Truth& truth) {
   raw.gyro_radps = truth.w_WB_B;
   raw.accel_mps2 = truth.X_WB.R.transpose() * (truth.a_WB + Vec3(0, 0, kGravity));
   if (!config_.noise_free) {
-    const VibrationModel::Shake shake = vibration_.step(truth.rotor_radps, truth.alpha_WB_B);
+    const VibrationModel::Shake shake = vibration_.step(truth.rotor_radps);
     raw.gyro_radps = gyro_.measure(raw.gyro_radps + shake.gyro_radps);
     raw.accel_mps2 = accel_.measure(raw.accel_mps2 + shake.accel_mps2);
   }

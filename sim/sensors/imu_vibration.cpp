@@ -88,15 +88,6 @@ VibrationModel::VibrationModel(const VibrationConfig& config, std::uint64_t seed
       shapers_[m + 1].gain[row] = white * spectrum_[axis].modes[m];
     }
   }
-
-  // q'' + 2 z w q' + w^2 q = alpha, alpha constant over the tick.
-  const double w = 2 * kPi * config.frame_mode_hz, z = config.frame_mode_damping;
-  const double wd = w * std::sqrt(1 - z * z), decay = std::exp(-z * w * kSecondsPerTick);
-  const double c = std::cos(wd * kSecondsPerTick), s = std::sin(wd * kSecondsPerTick);
-  transition_ << decay * (c + z * w / wd * s), decay * s / wd, -decay * w * w / wd * s,
-      decay * (c - z * w / wd * s);
-  const Eigen::Vector2d rest(1 / (w * w), 0);  // where a constant unit alpha ends
-  input_ = rest - transition_ * rest;
 }
 
 // Bilinear transforms, pre-warped to the frequency: s^2 / (s^2 + sqrt(2) s + 1) ...
@@ -133,24 +124,19 @@ VibrationModel::Six VibrationModel::Shaper::filter(const Six& white) {
   return y;
 }
 
-VibrationModel::Shake VibrationModel::step(const std::array<double, 4>& rotor_radps,
-                                           const Vec3& alpha_B) {
+VibrationModel::Shake VibrationModel::step(const std::array<double, 4>& rotor_radps) {
   Shake shake;
   double thrust = 0;  // over that at the reference speed
   for (const double speed : rotor_radps) {
     const double ratio = speed / config_.reference_speed_radps;
     thrust += ratio * ratio / static_cast<double>(kRotors);
   }
-  Vec3 gyro_rate = Vec3::Zero();
   if (thrust > 0 && config_.level != VibrationLevel::kNone) {
-    const Lines line = lines(rotor_radps);
-    const Six value = thrust * broadband() + line.value;
+    const Six line = lines(rotor_radps);
+    const Six value = thrust * broadband() + line;
     shake.accel_mps2 = value.head<3>();
     shake.gyro_radps = value.tail<3>();
-    gyro_rate = line.gyro_rate;
   }
-  rock(alpha_B + gyro_rate);
-  shake.gyro_radps += config_.frame_coupling * mount_rate_;
   return shake;
 }
 
@@ -164,8 +150,8 @@ VibrationModel::Six VibrationModel::broadband() {
   return sum;
 }
 
-VibrationModel::Lines VibrationModel::lines(const std::array<double, kRotors>& rotor_radps) {
-  Lines lines;
+VibrationModel::Six VibrationModel::lines(const std::array<double, kRotors>& rotor_radps) {
+  Six lines = Six::Zero();
   for (std::size_t i = 0; i < kRotors; ++i) {
     const double speed = rotor_radps[i], ratio = speed / config_.reference_speed_radps;
     angle_rad_[i] = std::fmod(angle_rad_[i] + speed * kSecondsPerTick, 2 * kPi);
@@ -176,25 +162,11 @@ VibrationModel::Lines VibrationModel::lines(const std::array<double, kRotors>& r
       const auto [phase_c, phase_s] = phase_[i][axis];
       const double c = turned_c * phase_c - turned_s * phase_s;
       const double s = turned_s * phase_c + turned_c * phase_s;
-      lines.value[static_cast<Eigen::Index>(axis)] +=
+      lines[static_cast<Eigen::Index>(axis)] +=
           growth * (of.once_per_rev * c + of.twice_per_rev * (c * c - s * s));
-      if (axis >= 3) {
-        lines.gyro_rate[static_cast<Eigen::Index>(axis - 3)] -=
-            growth * of.once_per_rev * speed * s;
-      }
     }
   }
   return lines;
-}
-
-void VibrationModel::rock(const Vec3& alpha_B) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector2d next =
-        transition_ * Eigen::Vector2d(mount_angle_[axis], mount_rate_[axis]) +
-        input_ * alpha_B[axis];
-    mount_angle_[axis] = next[0];
-    mount_rate_[axis] = next[1];
-  }
 }
 
 }  // namespace arex::sim

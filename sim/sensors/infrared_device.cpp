@@ -28,11 +28,14 @@ InfraredDevice::InfraredDevice(const InfraredConfig& config, const D430Config& u
       jobs_(context.jobs),
       lane_(jobs_.add_lane("infrared")),
       outlets_(context.outlets),
+      line_(context.faults, context.seed, "infrared"),
       auto_exposure_(config.sensor) {}
 
 InfraredDevice::~InfraredDevice() = default;
 
 void InfraredDevice::fire(const Moment& moment) {
+  now_ = moment.now;
+  if (!line_.sound()) pass(std::nullopt);
   const Stamp opened = from_seconds(static_cast<double>(frame_) / config_.rate_hz);
   if (opened <= moment.now) open(opened);
   if (open_ && open_->stamp <= moment.now) expose(moment);
@@ -64,18 +67,28 @@ void InfraredDevice::expose(const Moment& moment) {
     const std::shared_ptr<StereoImage> image = pair_->capture(shot);
     image->camera.X_BC = X_BC_drawn_;
     const double mean = central_mean(image->left, image->width, image->height);
-    return [this, image, shot, mean, hash = hash_of(*image)] { deliver(image, hash, shot, mean); };
+    return [this, image, shot, mean, hash = hash_of(*image)] {
+      auto_exposure_.add(mean, shot.exposure);
+      if (line_.sound()) {
+        hand_on(image, hash);
+      } else {
+        pass(image);
+      }
+      if (outlets_.on_images) outlets_.on_images(shot.stamp, *image, mean);
+    };
   });
 }
 
-void InfraredDevice::deliver(const std::shared_ptr<StereoImage>& image, std::uint64_t hash,
-                             const InfraredShot& shot, double mean) {
+void InfraredDevice::pass(const std::optional<StereoImagePtr>& image) {
+  line_.pass(now_, image,
+             [this](const StereoImagePtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
+}
+
+void InfraredDevice::hand_on(const StereoImagePtr& image, std::uint64_t hash) {
   note(hash);
   outlets_.frames.add(hash);
-  auto_exposure_.add(mean, shot.exposure);
   outlets_.software->add_images(image);
   if (outlets_.bag) outlets_.bag->infrared(*image);
-  if (outlets_.on_images) outlets_.on_images(shot.stamp, *image, mean);
 }
 
 }  // namespace arex::sim

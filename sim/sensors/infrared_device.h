@@ -6,6 +6,7 @@
 
 #include "sensors/d430_stereo.h"
 #include "sensors/device.h"
+#include "sensors/faulty_line.h"
 #include "sensors/infrared_exposure.h"
 #include "sensors/infrared_shot.h"
 
@@ -29,8 +30,9 @@ class InfraredDevice : public Device {
  private:
   void open(Stamp opened);
   void expose(const Moment& moment);
-  void deliver(const std::shared_ptr<StereoImage>& image, std::uint64_t hash,
-               const InfraredShot& shot, double mean);
+  /// Through the line of a device that is not sound.
+  void pass(const std::optional<StereoImagePtr>& image);
+  void hand_on(const StereoImagePtr& image, std::uint64_t hash);
 
   InfraredConfig config_;
   D430Config unit_;
@@ -42,6 +44,8 @@ class InfraredDevice : public Device {
   JobQueue& jobs_;
   JobQueue::Lane lane_;
   Outlets& outlets_;
+  FaultyLine<StereoImagePtr> line_;
+  Stamp now_ = 0;
   AutoExposure auto_exposure_;
   std::unique_ptr<InfraredPair> pair_;  ///< made when the first frame is drawn; in jobs of its lane
   std::int64_t frame_ = 0;              ///< index of the next

@@ -57,9 +57,12 @@ LidarDevice::LidarDevice(std::unique_ptr<const LidarModel> lidar, double latency
       latency_(from_seconds(latency_s)),
       jobs_(context.jobs),
       lane_(jobs_.add_lane(name_.empty() ? "lidar" : name_, JobQueue::Order::kSideBySide)),
-      outlets_(context.outlets) {}
+      outlets_(context.outlets),
+      line_(context.faults, context.seed, name_.empty() ? "lidar" : name_) {}
 
 void LidarDevice::fire(const Moment& moment) {
+  now_ = moment.now;
+  if (!line_.sound()) pass(std::nullopt);
   part_.push_back(moment.truth);
   const Stamp period = lidar_->period();
   const Stamp frame_begin = part_begin_ / period * period;
@@ -83,12 +86,25 @@ void LidarDevice::fire(const Moment& moment) {
 
 void LidarDevice::deliver(const Frame& frame) {
   frame.scan->device = name_;
-  note(frame.hash);
-  firings_ += frame.scan->firings();
-  misses_ += frame.scan->misses();
-  outlets_.frames.add(frame.hash);
-  outlets_.software->add_scan(frame.scan);
-  if (outlets_.bag) outlets_.bag->scan(*frame.scan);
+  if (line_.sound()) {
+    hand_on(frame.scan, frame.hash);
+  } else {
+    pass(frame.scan);
+  }
+}
+
+void LidarDevice::pass(const std::optional<LidarScanPtr>& scan) {
+  line_.pass(now_, scan,
+             [this](const LidarScanPtr& arrived) { hand_on(arrived, hash_of(*arrived)); });
+}
+
+void LidarDevice::hand_on(const LidarScanPtr& scan, std::uint64_t hash) {
+  note(hash);
+  firings_ += scan->firings();
+  misses_ += scan->misses();
+  outlets_.frames.add(hash);
+  outlets_.software->add_scan(scan);
+  if (outlets_.bag) outlets_.bag->scan(*scan);
 }
 
 }  // namespace arex::sim

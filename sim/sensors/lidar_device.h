@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "sensors/device.h"
+#include "sensors/faulty_line.h"
 #include "sensors/lidar_model.h"
 
 namespace arex::sim {
@@ -22,6 +24,9 @@ class LidarDevice : public Device {
  private:
   struct Frame;
   void deliver(const Frame& frame);
+  /// Through the line of a device that is not sound.
+  void pass(const std::optional<LidarScanPtr>& scan);
+  void hand_on(const LidarScanPtr& scan, std::uint64_t hash);
 
   std::string name_;
   std::unique_ptr<const LidarModel> lidar_;
@@ -29,6 +34,8 @@ class LidarDevice : public Device {
   JobQueue& jobs_;
   JobQueue::Lane lane_;
   Outlets& outlets_;
+  FaultyLine<LidarScanPtr> line_;
+  Stamp now_ = 0;
   std::vector<Truth> part_;  ///< ticks of the part being fired; a frame's first has one more
   Stamp part_begin_ = 0;
   std::shared_ptr<Frame> frame_;  ///< being fired

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "sensors/device.h"
+#include "sensors/faulty_line.h"
 
 namespace arex::sim {
 
@@ -20,22 +21,29 @@ class MocapDevice : public Device {
  public:
   /// @param X_WO the odometry's origin as it should be
   MocapDevice(const MocapConfig& config, const Pose& X_WO, const DeviceContext& context)
-      : config_(config), X_OW_(X_WO.inverse()), outlets_(context.outlets) {}
+      : config_(config),
+        X_OW_(X_WO.inverse()),
+        outlets_(context.outlets),
+        line_(context.faults, context.seed, "mocap") {}
 
   void fire(const Moment& moment) override {
     constexpr Stamp kPeriod = 5 * kNanosecondsPerTick;  // 200 Hz
-    if (moment.now % kPeriod != 0) return;
-    MocapSample sample{moment.now, X_OW_ * moment.truth.X_WB, X_OW_.R * moment.truth.v_WB};
-    if (moment.now >= from_seconds(config_.fault_jump_from_s)) {
-      sample.X_OB.p += config_.fault_jump_m;
+    std::optional<MocapSample> reading;
+    if (moment.now % kPeriod == 0) {
+      reading = {moment.now, X_OW_ * moment.truth.X_WB, X_OW_.R * moment.truth.v_WB};
+      if (moment.now >= from_seconds(config_.fault_jump_from_s)) {
+        reading->X_OB.p += config_.fault_jump_m;
+      }
     }
-    outlets_.software->add_mocap(sample);
+    line_.pass(moment.now, reading,
+               [this](const MocapSample& sample) { outlets_.software->add_mocap(sample); });
   }
 
  private:
   MocapConfig config_;
   Pose X_OW_;
   Outlets& outlets_;
+  FaultyLine<MocapSample> line_;
 };
 
 }  // namespace arex::sim

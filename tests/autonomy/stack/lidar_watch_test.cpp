@@ -17,6 +17,7 @@ constexpr int kFirings = 20000;
 struct Flaws {
   double missing = 0.005;  ///< share of the returns lost
   double spikes = 0;       ///< share at any range
+  double noise_m = 0;      ///< RMS of the ranges
 };
 
 /// A scan in a room with a clutter of poles, `clutter` of the firings on one.
@@ -30,6 +31,7 @@ LidarScan make_scan(Stamp end, const Flaws& flaws, double clutter, RandomStream&
     if (random.uniform() < clutter) range *= 0.6;
     if (random.uniform() < flaws.missing) continue;
     if (random.uniform() < flaws.spikes) range = random.uniform(0.5, 40);
+    if (flaws.noise_m > 0) range += flaws.noise_m * random.normal();
     LidarPoint point;
     point.p_L = Vec3(range * std::cos(angle), range * std::sin(angle), 0).cast<float>();
     point.offset_ns = static_cast<std::uint32_t>(5000 * i);
@@ -107,6 +109,17 @@ TEST(LidarWatch, NoticesATenthOfTheReturnsFalse) {
     for (int i = 0; i < 50; ++i) w.frame({.spikes = 0.1}, matched(1300, 1500));  // not got used to
     for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
     EXPECT_EQ(w.told(), "2:lidar returns false;52:lidar sound again;");
+  }
+}
+
+TEST(LidarWatch, NoticesRangesNoisierThanUsual) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Watching w(seed);
+    for (int i = 0; i < 30; ++i) w.frame({.noise_m = 0.012}, matched(1400, 1500));
+    w.count_from_here();
+    for (int i = 0; i < 50; ++i) w.frame({.noise_m = 0.1}, matched(1300, 1500));  // not got used to
+    for (int i = 0; i < 10; ++i) w.frame({.noise_m = 0.012}, matched(1400, 1500));
+    EXPECT_EQ(w.told(), "2:lidar noisy;52:lidar sound again;");
   }
 }
 

@@ -6,6 +6,7 @@
 #include "autopilot/autopilot.h"
 #include "control/timed_path.h"
 #include "control/tracker.h"
+#include "physics/flexible_frame.h"
 #include "physics/physics.h"
 #include "sensors/imu.h"
 #include "worlds/world.h"
@@ -43,6 +44,7 @@ class ClosedLoop {
                   Vec3(0, 0, VehicleConfig{}.ground_offset_m)},
         physics(options.physics, world_,
                 {so3::Exp({options.ground_slope_rad, 0, 0}) * X_WO_.R, X_WO_.p}, seed),
+        frame(options.physics.frame, physics.airframe(), seed),
         imu(options.imu, seed),
         autopilot(options.autopilot, VehicleConfig{}),
         tracker(options.tracker, VehicleConfig{}) {}
@@ -88,7 +90,8 @@ class ClosedLoop {
  private:
   void sense() {
     const Truth& truth = physics.truth();
-    autopilot.add_imu(imu.sample(truth));
+    if (!frame.stiff()) frame.step(truth);
+    autopilot.add_imu(imu.sample(frame.stiff() ? truth : frame.plate()));
     if (imu.magnetometer()) autopilot.add_magnetometer(*imu.magnetometer());
     if (imu.barometer()) autopilot.add_barometer(*imu.barometer());
     if (truth.stamp % (20 * kNanosecondsPerTick) == 0) {
@@ -116,6 +119,7 @@ class ClosedLoop {
 
  public:
   Physics physics;
+  FlexibleFrame frame;
   ImuModel imu;
   Autopilot autopilot;
   Tracker tracker;

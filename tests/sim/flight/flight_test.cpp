@@ -372,7 +372,7 @@ struct FrameRun {
 };
 FrameRun hover_on_frame(double coupling, std::uint64_t seed) {
   ClosedLoop::Options options = options_in(Vec3::Zero());
-  options.imu.vibration.frame_coupling = coupling;
+  options.physics.frame.load_ratio = coupling;
   ClosedLoop loop(options, seed);
   EXPECT_TRUE(loop.start());
   ErrorStatistics rate, position;

@@ -246,5 +246,61 @@ TEST(Powertrain, ControllersComeBackOnlyAfterZeroThrottle) {
   EXPECT_FALSE(powertrain.browned_out());
 }
 
+TEST(Powertrain, AWeakMotorGivesItsShareOfTheThrustAtAnyThrottle) {
+  for (const double throttle : {0.3, 0.5, 0.9}) {
+    for (const double share : {0.9, 0.7}) {
+      Powertrain powertrain({}, {}, {});
+      DriveFaults faults;
+      faults.thrust_share[1] = share;
+      powertrain.set_faults(faults);
+      for (int i = 0; i < 1000; ++i) powertrain.step(all(throttle));
+      const auto& speed = powertrain.rotor_radps();
+      EXPECT_NEAR(std::pow(speed[1] / speed[0], 2), share, 0.005) << throttle;
+      EXPECT_EQ(speed[0], speed[3]);
+    }
+  }
+}
+
+TEST(Powertrain, AStoppedControllerGivesNoCurrentAndItsRotorRunsOut) {
+  Powertrain powertrain({}, {}, {});
+  powertrain.set_rotor_radps({716, 716, 716, 716});
+  DriveFaults faults;
+  faults.stopped[2] = true;
+  powertrain.set_faults(faults);
+  for (int i = 0; i < 300; ++i) powertrain.step(all(0.5));
+  EXPECT_EQ(powertrain.motor_current_a()[2], 0);
+  // J w' = -kQ w^2 - Kt I0, from 716 rad/s.
+  const RotorConfig rotor;
+  const MotorConfig motor;
+  double speed = 716;
+  for (int i = 0; i < 30000; ++i) {
+    speed -= 1e-5 / rotor.inertia_kgm2 *
+             (rotor.thrust_coefficient * rotor.torque_ratio_m * speed * speed +
+              motor.torque_constant_nm_per_a * motor.no_load_current_a);
+  }
+  EXPECT_NEAR(powertrain.rotor_radps()[2], speed, 0.5);
+  EXPECT_GT(powertrain.rotor_radps()[0], 600);
+  faults.stopped[2] = false;
+  powertrain.set_faults(faults);
+  for (int i = 0; i < 1000; ++i) powertrain.step(all(0.5));
+  EXPECT_NEAR(powertrain.rotor_radps()[2], powertrain.rotor_radps()[0], 1);
+}
+
+TEST(Powertrain, AWornCellCostsVoltageAndMoreUnderLoad) {
+  Powertrain sound({}, {}, {}), worn({}, {}, {});
+  DriveFaults faults;
+  faults.added_resistance_ohm = 0.05;
+  faults.lost_voltage_v = 0.3;
+  worn.set_faults(faults);
+  for (int i = 0; i < 1000; ++i) {
+    sound.step(all(0.55));
+    worn.step(all(0.55));
+  }
+  const BatteryState &a = sound.battery(), &b = worn.battery();
+  EXPECT_NEAR(worn.open_circuit_v(), sound.open_circuit_v() - 0.3, 0.01);
+  EXPECT_NEAR(worn.open_circuit_v() - b.voltage_v, 0.078 * b.current_a, 1e-4);
+  EXPECT_NEAR(sound.open_circuit_v() - a.voltage_v, 0.028 * a.current_a, 1e-4);
+}
+
 }  // namespace
 }  // namespace arex::sim

@@ -8,6 +8,7 @@
 
 #include "config/config.h"
 #include "quantised_reader.h"
+#include "report/outcome_matrix.h"
 #include "report/overlay.h"
 #include "report/run_record.h"
 #include "support/temporary_folder.h"
@@ -60,6 +61,37 @@ TEST(ComparisonReport, TitlesARunByWhatWasVaried) {
   EXPECT_EQ(title_in_sweep(folder / "elsewhere/run"), "");
   const std::string html = comparison_report_html(results, "sweep", folder.path());
   EXPECT_TRUE(contains(html, "inflation_m 0.3, weight_direction 3, seed 2"));  // the collided one
+}
+
+TEST(ComparisonReport, CountsWhatBecameOfEachFaultAndWhatWasTold) {
+  ResultTable results;
+  results.keys = {"scenario", "variant", "faults"};
+  results.table = parse_table(
+      "scenario,variant,faults,seed,failure,detail,outcome,faults.told,faults.told_after_s\n"
+      "a,lidar silent,x,1,,,stuck,sensor_fault: lidar silent,0.3\n"
+      "a,lidar silent,x,2,,,collided,sensor_fault: lidar silent,0.4\n"
+      "a,motor weak,y,1,,,succeeded,vehicle_fault: motor 2 weak: 31 % missing,2\n"
+      "a,motor weak,y,2,,,collided,,\n"
+      "a,motor weak,y,3,crashed,signal 11,,,\n"
+      "a,weak frame,z,1,,,lost,vibration: gyro 2.1 rad/s RMS at 80 Hz,1\n"
+      "a,weak frame,z,2,,,timed_out,vibration: gyro 2.7 rad/s RMS at 81 Hz,3\n");
+  results.folders.assign(7, "none");
+  const std::vector<OutcomeRow> rows = outcome_matrix(results);
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows[0].title, "a: lidar silent");
+  EXPECT_EQ(rows[0].landed + 10 * rows[0].collided, 11);
+  EXPECT_EQ(rows[0].untold, 0);
+  EXPECT_EQ(rows[0].told, "sensor_fault: lidar silent (2)");
+  EXPECT_EQ(rows[0].told_after_s, 0.4);
+  EXPECT_EQ(rows[1].continued + 10 * rows[1].collided + 100 * rows[1].broken, 111);
+  EXPECT_EQ(rows[1].untold, 1);
+  EXPECT_EQ(rows[1].told, "nothing (1), vehicle_fault: motor 2 weak (1)");
+  EXPECT_EQ(rows[2].lost + 10 * rows[2].timed_out, 11);
+  EXPECT_EQ(rows[2].told, "vibration (2)");
+  EXPECT_TRUE(contains(outcomes_html(results), "<td class=\"word\">a: lidar silent</td>"));
+  results.table = parse_table("scenario,variant,seed,failure,detail,outcome\na,b,1,,,stuck\n");
+  results.folders.assign(1, "none");
+  EXPECT_EQ(outcomes_html(results), "");
 }
 
 TEST(ComparisonReport, TitlesTellEveryTwoRunsApart) {

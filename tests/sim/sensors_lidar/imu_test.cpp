@@ -213,33 +213,6 @@ TEST(ImuModel, OutputPassesSlowMotionWithTheFiltersDelay) {
   }
 }
 
-TEST(ImuVibration, WeakFrameRocksAtItsMode) {
-  // Steady response of q'' + 2 z w0 q' + w0^2 q = -alpha to a sine: |q'| = A w / |w0^2 - w^2 + 2 j
-  // z w0 w|.
-  const double w0 = 2 * kPi * 80, z = 0.03;
-  for (const double frequency : {20.0, 60.0, 80.0, 100.0}) {
-    ImuConfig config = quiet();
-    config.vibration.frame_coupling = 1;
-    ImuModel imu(config, 9);
-    const double w = 2 * kPi * frequency;
-    std::vector<double> gyro;
-    for (int i = 0; i < 2000; ++i) {
-      Truth truth = at_tick(i);
-      truth.alpha_WB_B.x() = 10 * std::cos(w * 1e-3 * i);
-      const double value = imu.sample(truth).gyro_radps.x();
-      if (i >= 1000) gyro.push_back(value);
-    }
-    const double gain = 10 * w / std::abs(std::complex<double>(w0 * w0 - w * w, 2 * z * w0 * w));
-    // Held over a tick, the drive loses sin(x)/x of its amplitude.
-    const double held = std::sin(w * 0.5e-3) / (w * 0.5e-3);
-    EXPECT_NEAR(amplitude(gyro, frequency, 1000), gain * held, 0.02 * gain) << frequency << " Hz";
-  }
-  ImuModel stiff(quiet(), 9);
-  Truth truth = at_tick(0);
-  truth.alpha_WB_B.x() = 10;
-  EXPECT_EQ(stiff.sample(truth).gyro_radps.norm(), 0);
-}
-
 TEST(ImuModel, MagnetometerAndBarometerReadTheEarth) {
   ImuConfig config;
   config.magnetometer_bias_sigma_gauss = 0;

@@ -122,7 +122,7 @@ TEST(ImuVibration, IsSilentAtLevelNoneAndWhereNothingTurns) {
   }
   VibrationModel none({.level = VibrationLevel::kNone}, 1);
   for (int i = 0; i < 100; ++i) {
-    const auto shake = none.step({716, 716, 716, 716}, Vec3(0.1, 0, 0));
+    const auto shake = none.step({716, 716, 716, 716});
     ASSERT_EQ(shake.accel_mps2.norm() + shake.gyro_radps.norm(), 0);
   }
 }
@@ -144,7 +144,7 @@ TEST(ImuVibration, EveryRotorHasItsOwnLineAndTheirSquaresAddUp) {
     for (std::size_t i = 0; i < 4; ++i) speeds[i] = 2 * kPi * revolutions[i];
     std::vector<double> accel_z, gyro_y;
     for (int i = 0; i < 20'000; ++i) {
-      const auto shake = model.step(speeds, Vec3::Zero());
+      const auto shake = model.step(speeds);
       accel_z.push_back(shake.accel_mps2.z());
       gyro_y.push_back(shake.gyro_radps.y());
     }
@@ -168,7 +168,7 @@ TEST(ImuVibration, GrowsWithThrustAndScale) {
     VibrationModel model({.scale = scale}, 3);
     double sum = 0;
     for (int i = 0; i < 20'000; ++i) {
-      sum += model.step({speed, speed, speed, speed}, Vec3::Zero()).accel_mps2.squaredNorm();
+      sum += model.step({speed, speed, speed, speed}).accel_mps2.squaredNorm();
     }
     return std::sqrt(sum / 20'000);
   };
@@ -186,7 +186,7 @@ TEST(ImuVibration, DriftsNeitherVelocityNorAttitude) {
     Vec3 velocity = Vec3::Zero(), angle = Vec3::Zero();
     double most_velocity = 0, most_angle = 0;
     for (int i = 0; i < 60'000; ++i) {
-      const auto shake = model.step(rotors.next(), Vec3::Zero());
+      const auto shake = model.step(rotors.next());
       velocity += 1e-3 * shake.accel_mps2;
       angle += 1e-3 * shake.gyro_radps;
       most_velocity = std::max(most_velocity, velocity.norm());

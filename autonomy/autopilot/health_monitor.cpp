@@ -1,0 +1,133 @@
+#include "autopilot/health_monitor.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace arex {
+namespace {
+
+constexpr double kImuHz = 1000;
+constexpr double kStepMemory = 50;  // readings
+
+// An IMU at 1 kHz flies the vehicle: it is missed at once. The others correct slowly.
+constexpr StreamWatchConfig kImuStream{.silent_s = 0.02, .stuck_readings = 50, .late_s = 0.004};
+constexpr StreamWatchConfig kFieldStream{.silent_s = 0.2, .stuck_readings = 60};
+constexpr StreamWatchConfig kPressureStream{
+    .silent_s = 0.3, .stuck_readings = 20, .learnt_readings = 50};
+constexpr StreamWatchConfig kPowerStream{.silent_s = 0.2, .stuck_readings = 100};
+
+}  // namespace
+
+void HealthMonitor::Steps::add(const Vec3& value, double share) {
+  // One jump, as when a stuck sensor comes back, is no noise: it counts for little at first.
+  constexpr double kOutlier = 25, kLeast = 1e-9;
+  const double step = (value - last).squaredNorm();
+  if (squares >= 0) {
+    squares += share * (std::min(step, kOutlier * std::max(squares, kLeast)) - squares);
+  }
+  squares = std::max(squares, 0.0);
+  last = value;
+}
+
+HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& mix,
+                             double weight_n)
+    : config_(config),
+      imu_("autopilot's imu", kImuStream),
+      magnetometer_("magnetometer", kFieldStream),
+      barometer_("barometer", kPressureStream),
+      power_("power", kPowerStream),
+      vibration_(config.vibration, kImuHz),
+      motors_(config.motor, mix, weight_n) {}
+
+void HealthMonitor::add_imu(Stamp now, const ImuSample& imu) {
+  const Vec3 &w = imu.gyro_radps, &a = imu.accel_mps2;
+  imu_.add(now, imu.stamp, std::array{w.x(), w.y(), w.z(), a.x(), a.y(), a.z()});
+  vibration_.add(w, a);
+}
+
+void HealthMonitor::add_magnetometer(Stamp now, const MagnetometerSample& sample) {
+  magnetometer_.add(now, sample.stamp, {sample.field_gauss.data(), 3});
+  field_.add(sample.field_gauss, 1 / kStepMemory);
+}
+
+void HealthMonitor::add_barometer(Stamp now, const BarometerSample& sample) {
+  barometer_.add(now, sample.stamp, {&sample.pressure_pa, 1});
+  pressure_.add(Vec3(sample.pressure_pa, 0, 0), 1 / kStepMemory);
+}
+
+void HealthMonitor::add_battery(Stamp now, const BatterySample& sample) {
+  power_.add(now, sample.stamp, std::array{sample.voltage_v, sample.current_a});
+  pack_.add(sample);
+}
+
+void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {
+  watch_streams(now, flight.in_air);
+  watch_noise(now, field_, config_.field_step_gauss, "magnetometer");
+  watch_noise(now, pressure_, config_.pressure_step_pa, "barometer");
+  // On the ground the motors idle, and hands may shake it.
+  const auto shaken = vibration_.update();
+  if (shaken && flight.armed) report(now, EventKind::kVibration, "autopilot: " + *shaken);
+  watch_tilt(now, flight, dt_s);
+  watch_battery(now);
+  if (!flight.in_air) {
+    motors_.reset();
+    return;
+  }
+  motors_.update(flight.missing, dt_s);
+  if (const auto found = motors_.take()) {
+    report(now, EventKind::kVehicleFault,
+           fmt::format("motor {} {}: {:.0f} % of its hover thrust is missing", found->motor + 1,
+                       found->stopped ? "stopped" : "weak", 100 * found->fraction));
+  }
+}
+
+void HealthMonitor::watch_streams(Stamp now, bool in_air) {
+  for (StreamWatch* stream : {&imu_, &magnetometer_, &barometer_, &power_}) {
+    if (auto change = stream->update(now, in_air)) {
+      report(now, EventKind::kSensorFault, *std::move(change));
+    }
+  }
+}
+
+void HealthMonitor::watch_noise(Stamp now, Steps& steps, double limit, const std::string& name) {
+  constexpr double kOver = 0.5;  // of the limit: it has ended
+  const double rms = std::sqrt(std::max(steps.squares, 0.0));
+  if (!steps.told && rms > limit) {
+    steps.told = true;
+    report(now, EventKind::kSensorFault, name + " noisy");
+  } else if (steps.told && rms < kOver * limit) {
+    steps.told = false;
+    report(now, EventKind::kSensorFault, name + " quiet again");
+  }
+}
+
+void HealthMonitor::watch_tilt(Stamp now, const Flight& flight, double dt_s) {
+  tilted_s_ = flight.armed && flight.tilt_rad > config_.tilt_limit_rad ? tilted_s_ + dt_s : 0;
+  if (tilted_s_ == 0) tilt_told_ = false;
+  if (tilted_s_ <= config_.tilt_s || std::exchange(tilt_told_, true)) return;
+  report(now, EventKind::kVehicleFault,
+         fmt::format("out of control: leans by {:.0f} degrees",
+                     flight.tilt_rad * 180 / std::numbers::pi));
+}
+
+void HealthMonitor::watch_battery(Stamp now) {
+  const auto resistance = pack_.resistance_ohm();
+  const double limit = config_.weak_pack_factor * config_.pack_resistance_ohm;
+  if (!resistance || *resistance < limit || std::exchange(pack_told_, true)) return;
+  report(now, EventKind::kVehicleFault,
+         fmt::format("battery cell weak: the pack's inner resistance is {:.0f} mohm",
+                     1e3 * *resistance));
+}
+
+void HealthMonitor::report(Stamp now, EventKind kind, std::string detail) {
+  notices_.push_back({now, kind, std::move(detail)});
+}
+
+std::vector<Event> HealthMonitor::take_notices() { return std::exchange(notices_, {}); }
+
+}  // namespace arex

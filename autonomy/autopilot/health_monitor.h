@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "autopilot/health_config.h"
+#include "autopilot/motor_watch.h"
+#include "autopilot/pack_watch.h"
+#include "math/stream_watch.h"
+#include "math/vibration_watch.h"
+#include "messages/events.h"
+#include "messages/sensors.h"
+
+namespace arex {
+
+/// What the autopilot finds to be wrong with its sensors, its motors, its battery and its airframe.
+/// It tells and does nothing: what becomes of the flight is the mission's to decide.
+class HealthMonitor {
+ public:
+  HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& mix, double weight_n);
+
+  // What arrives, between two calls of update.
+  void add_imu(Stamp now, const ImuSample& imu);
+  void add_magnetometer(Stamp now, const MagnetometerSample& sample);
+  void add_barometer(Stamp now, const BarometerSample& sample);
+  void add_battery(Stamp now, const BatterySample& sample);
+
+  /// How it flies, as the autopilot knows it.
+  struct Flight {
+    bool armed = false;
+    bool in_air = false;  ///< flying, and nothing but its rotors carries it
+    double tilt_rad = 0;
+    MotorWatch::Missing missing;  ///< of thrust and torque
+  };
+  /// @param dt_s since the last call
+  void update(Stamp now, const Flight& flight, double dt_s);
+
+  /// What is new since the last call.
+  std::vector<Event> take_notices();
+
+  [[nodiscard]] const MotorWatch& motors() const { return motors_; }
+  [[nodiscard]] const VibrationWatch& vibration() const { return vibration_; }
+
+ private:
+  /// Mean square of the steps between readings of a sensor, over a second or so.
+  struct Steps {
+    Vec3 last = Vec3::Zero();
+    double squares = -1;  ///< -1: no reading yet
+    bool told = false;
+    void add(const Vec3& value, double share);
+  };
+
+  void report(Stamp now, EventKind kind, std::string detail);
+  void watch_streams(Stamp now, bool in_air);
+  void watch_noise(Stamp now, Steps& steps, double limit, const std::string& name);
+  void watch_tilt(Stamp now, const Flight& flight, double dt_s);
+  void watch_battery(Stamp now);
+
+  HealthConfig config_;
+  StreamWatch imu_, magnetometer_, barometer_, power_;
+  VibrationWatch vibration_;
+  MotorWatch motors_;
+  PackWatch pack_;
+  Steps field_, pressure_;
+  double tilted_s_ = 0;
+  bool tilt_told_ = false;
+  bool pack_told_ = false;
+  std::vector<Event> notices_;
+};
+
+}  // namespace arex

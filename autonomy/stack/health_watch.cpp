@@ -1,0 +1,160 @@
+#include "stack/health_watch.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace arex {
+namespace {
+
+constexpr double kImuHz = 200;
+constexpr double kImageMemory = 50;  // frames
+constexpr int kPixelStep = 8;        // a survey needs no more of 400,000 pixels
+
+constexpr StreamWatchConfig kImuStream{
+    .silent_s = 0.03, .stuck_readings = 20, .late_s = 0.006, .learnt_readings = 100};
+// What is silent of a LiDAR is LidarWatch's to say.
+constexpr StreamWatchConfig kLidarStream{
+    .silent_s = 1e6, .stuck_readings = 2, .late_s = 0.08, .learnt_readings = 10};
+constexpr StreamWatchConfig kDepthStream{
+    .silent_s = 0.5, .stuck_readings = 2, .late_s = 0.08, .learnt_readings = 10};
+constexpr StreamWatchConfig kMocapStream{.silent_s = 0.1, .stuck_readings = 40};
+
+struct Survey {
+  double valid = 0;  ///< share of the pixels looked at
+  double rough = 0;  ///< mean deviation from the neighbours' mean, of the depth
+};
+
+Survey survey(const DepthImage& image) {
+  constexpr float kSameSurface = 0.1F;  // of the depth
+  constexpr float kNear_m = 3;          // beyond, a stereo camera's own noise is as large
+  int looked = 0, valid = 0, smooth = 0;
+  double deviation = 0;
+  for (int v = 0; v < image.camera.height; v += kPixelStep) {
+    for (int u = kPixelStep; u + kPixelStep < image.camera.width; u += kPixelStep) {
+      ++looked;
+      const float here = image.at(u, v);
+      if (here == 0) continue;
+      ++valid;
+      const float left = image.at(u - 4, v), right = image.at(u + 4, v);
+      const float mean = 0.5F * (left + right);
+      if (left == 0 || right == 0 || mean > kNear_m) continue;
+      if (std::abs(left - right) > kSameSurface * mean) continue;
+      if (std::abs(here - mean) > 3 * kSameSurface * mean) continue;
+      ++smooth;
+      deviation += std::abs(here - mean) / mean;
+    }
+  }
+  if (looked == 0) return {};
+  constexpr int kFew = 100;  // say nothing
+  return {static_cast<double>(valid) / looked, smooth >= kFew ? deviation / smooth : 0};
+}
+
+}  // namespace
+
+HealthWatch::HealthWatch(const HealthWatchConfig& config)
+    : config_(config), vibration_(config.vibration, kImuHz) {}
+
+StreamWatch& HealthWatch::stream(const std::string& name, const StreamWatchConfig& config) {
+  return streams_.try_emplace(name, name, config).first->second;
+}
+
+void HealthWatch::add_imu(Stamp now, const ImuSample& imu) {
+  const Vec3 &w = imu.gyro_radps, &a = imu.accel_mps2;
+  stream("imu", kImuStream)
+      .add(now, imu.stamp, std::array{w.x(), w.y(), w.z(), a.x(), a.y(), a.z()});
+  vibration_.add(w, a);
+}
+
+void HealthWatch::add_scan(Stamp now, const LidarScan& scan) {
+  std::array<double, StreamWatch::kValues> ends{};
+  if (!scan.points.empty()) {
+    const Vec3f &first = scan.points.front().p_L, &last = scan.points.back().p_L;
+    ends = {first.x(), first.y(), first.z(), last.x(), last.y(), last.z()};
+  }
+  stream(scan.device.empty() ? "lidar" : scan.device, kLidarStream).add(now, scan.end, ends);
+}
+
+void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
+  const std::string name = image.device.empty() ? "depth" : image.device;
+  const Survey seen = survey(image);
+  // Dark images are alike, and nothing stuck.
+  const double tells_apart = seen.valid > 0 ? 0 : to_seconds(image.stamp);
+  stream(name, kDepthStream).add(now, image.stamp, std::array{seen.valid, seen.rough, tells_apart});
+  Images& images = images_[name];
+  if (images.usual_valid < 0) images.usual_valid = seen.valid;
+  if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;
+  const bool blind = seen.valid < config_.blind_share * images.usual_valid;
+  const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_fraction &&
+                     seen.rough > config_.rough_factor * images.usual_rough;
+  images.blind = blind ? images.blind + 1 : 0;
+  images.rough = rough ? images.rough + 1 : 0;
+  // What is wrong does not become usual.
+  if (!blind) images.usual_valid += (seen.valid - images.usual_valid) / kImageMemory;
+  if (!rough && seen.rough > 0) {
+    images.usual_rough += (seen.rough - images.usual_rough) / kImageMemory;
+  }
+  tell_images(now, name, images);
+}
+
+void HealthWatch::tell_images(Stamp now, const std::string& name, Images& images) {
+  const auto tell = [&](int in_a_row, bool& told, const char* what) {
+    if (!told && in_a_row >= config_.frames) {
+      told = true;
+      report(now, EventKind::kSensorFault, name + " " + what);
+    } else if (told && in_a_row == 0) {
+      told = false;
+      report(now, EventKind::kSensorFault, name + " not " + what + " any more");
+    }
+  };
+  tell(images.blind, images.told_blind, "blinded");
+  tell(images.rough, images.told_rough, "noisy");
+}
+
+void HealthWatch::add_mocap(Stamp now, const MocapSample& mocap) {
+  const Vec3 &p = mocap.X_OB.p, &v = mocap.v_OB;
+  stream("mocap", kMocapStream)
+      .add(now, mocap.stamp, std::array{p.x(), p.y(), p.z(), v.x(), v.y(), v.z()});
+}
+
+bool HealthWatch::Lasting::holds(bool now_so, Stamp now, double for_s) {
+  if (!now_so) {
+    since = -1;
+    told = false;
+    return false;
+  }
+  if (since < 0) since = now;
+  return now - since >= from_seconds(for_s) && !std::exchange(told, true);
+}
+
+std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
+  for (auto& [name, stream] : streams_) {
+    if (auto change = stream.update(now, flight.in_air)) {
+      report(now, EventKind::kSensorFault, *std::move(change));
+    }
+  }
+  const auto shaken = vibration_.update();
+  if (shaken && flight.armed) report(now, EventKind::kVibration, *shaken);
+  const double difference = flight.attitude_difference_rad;
+  if (contradicts_.holds(flight.in_air && difference > config_.attitude_limit_rad, now,
+                         config_.lasting_s)) {
+    report(now, EventKind::kSensorFault,
+           fmt::format("attitude: autopilot and odometry differ by {:.0f} degrees",
+                       difference * 180 / std::numbers::pi));
+  }
+  if (off_path_.holds(flight.in_air && flight.off_path_m > config_.off_path_m, now,
+                      config_.lasting_s)) {
+    report(now, EventKind::kVehicleFault,
+           fmt::format("out of control: {:.1f} m off its path", flight.off_path_m));
+  }
+  return std::exchange(events_, {});
+}
+
+void HealthWatch::report(Stamp now, EventKind kind, std::string detail) {
+  events_.push_back({now, kind, std::move(detail)});
+}
+
+}  // namespace arex

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "math/stream_watch.h"
+#include "math/vibration_watch.h"
+#include "messages/events.h"
+#include "messages/sensors.h"
+#include "stack/health_watch_config.h"
+
+namespace arex {
+
+/// What the companion computer can tell of its sensors without a word from their makers: whether
+/// messages come, change and are in time, what a depth image looks like against those before, and
+/// whether the vehicle does as it is told. What the LiDAR's points say is LidarWatch's.
+class HealthWatch {
+ public:
+  explicit HealthWatch(const HealthWatchConfig& config);
+
+  // What arrives, between two calls of update.
+  void add_imu(Stamp now, const ImuSample& imu);
+  void add_scan(Stamp now, const LidarScan& scan);
+  void add_depth(Stamp now, const DepthImage& image);
+  void add_mocap(Stamp now, const MocapSample& mocap);
+
+  /// How it flies, as the stack knows it.
+  struct Flight {
+    bool armed = false;
+    bool in_air = false;
+    double attitude_difference_rad = 0;  ///< between the verticals of autopilot and odometry
+    double off_path_m = 0;               ///< from the setpoint
+  };
+  /// @return what is new since the last call
+  std::vector<Event> update(Stamp now, const Flight& flight);
+
+ private:
+  /// One depth camera's images against its usual ones.
+  struct Images {
+    double usual_valid = -1;  ///< share; -1: none yet
+    double usual_rough = -1;
+    int blind = 0, rough = 0;  ///< frames in a row
+    bool told_blind = false, told_rough = false;
+  };
+  /// Something that must last before it is told.
+  struct Lasting {
+    Stamp since = -1;
+    bool told = false;
+    /// @return whether it is new
+    bool holds(bool now_so, Stamp now, double for_s);
+  };
+
+  StreamWatch& stream(const std::string& name, const StreamWatchConfig& config);
+  void report(Stamp now, EventKind kind, std::string detail);
+  void tell_images(Stamp now, const std::string& name, Images& images);
+
+  HealthWatchConfig config_;
+  VibrationWatch vibration_;
+  std::map<std::string, StreamWatch> streams_;
+  std::map<std::string, Images> images_;
+  Lasting contradicts_, off_path_;
+  std::vector<Event> events_;
+};
+
+}  // namespace arex

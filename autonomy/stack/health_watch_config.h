@@ -1,0 +1,38 @@
+#pragma once
+
+#include "math/vibration_config.h"
+
+namespace arex {
+
+/// What the stack calls wrong with its sensors and its flight.
+struct HealthWatchConfig {
+  VibrationWatchConfig vibration;
+  double blind_share = 0.4;         ///< of the usual valid pixels; sound flights stay above 0.6
+  double rough_factor = 2;          ///< of the usual roughness of a depth image
+  double rough_fraction = 0.03;     ///< and this, of the depth: five times a D430's at 1.5 m
+  int frames = 5;                   ///< in a row
+  double attitude_limit_rad = 0.2;  ///< a tenth of it is what two sound estimates differ by
+  double off_path_m = 0.8;          ///< sound flights stay below 0.3
+  double lasting_s = 0.2;           ///< of the two above
+
+  void fields(auto& f) {
+    f("vibration", vibration, "when the airframe is called shaking, by the IMU's output");
+    f("blind_share", blind_share,
+      "a depth image with less than this part of the usual pixels is blinded");
+    f("rough_factor", rough_factor, "one that is this much rougher than usual is noisy");
+    f("rough_fraction", rough_fraction,
+      "if its pixels lie further than this, of their depth, off their neighbours' mean");
+    f("frames", frames, "in a row");
+    f("attitude_limit_rad", attitude_limit_rad,
+      "autopilot and odometry contradict each other if their verticals differ by more");
+    f("off_path_m", off_path_m, "the vehicle is off its path if it is further from its setpoint");
+    f("lasting_s", lasting_s, "for so long");
+    f.check(blind_share > 0 && blind_share < 1, "0 < blind_share < 1");
+    f.check(rough_factor > 1 && rough_fraction > 0, "rough_factor > 1, rough_fraction > 0");
+    f.check(frames >= 1 && frames <= 1000, "1 <= frames <= 1000");
+    f.check(attitude_limit_rad > 0 && off_path_m > 0 && lasting_s >= 0,
+            "attitude_limit_rad, off_path_m > 0, lasting_s >= 0");
+  }
+};
+
+}  // namespace arex

@@ -13,6 +13,7 @@
 #include "physics/airframe.h"
 #include "physics/physics_config.h"
 #include "run/device_section.h"
+#include "run/interfaces.h"
 #include "run/operator_link.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
@@ -79,6 +80,7 @@ struct ScenarioConfig {
   MocapConfig mocap;
   std::map<std::string, DeviceSection> devices;
   AutopilotConfig autopilot;
+  InterfaceConfig interfaces;
   StackConfig stack;
   std::vector<OperatorOrder> commands;
   OperatorLinkConfig operator_link;
@@ -97,6 +99,7 @@ struct ScenarioConfig {
       "further ones by name: {type: mid360|spinning|d430, position_m: [..], rotation_rad: [..], "
       "...}");
     f("autopilot", autopilot, "flight controller");
+    f("interfaces", interfaces, "what the flight controller is connected by");
     stack.fields(f);
     f("commands", commands,
       "what the operator does: [{at_s: 120, do: hold}, {on: stop, do: land}, ...]; on: "

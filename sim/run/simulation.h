@@ -11,6 +11,7 @@
 #include "jobs/job_queue.h"
 #include "math/fingerprint.h"
 #include "physics/physics.h"
+#include "run/dshot.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
 #include "run/stage_timer.h"
@@ -130,6 +131,7 @@ class Simulation {
   Scene scene_;
   Physics physics_;
   Autopilot autopilot_;
+  DshotWires wires_;
   Recorder* recorder_ = nullptr;
 
   Stamp now_ = 0;

@@ -15,6 +15,10 @@ constexpr std::array<int, 8> kDx{1, 0, -1, 0, 1, -1, -1, 1}, kDy{0, 1, 0, -1, 1,
 /// Cost of a step between tiles: 7/5 is the square root of 2 to 1 %.
 constexpr std::size_t kStraight = 5, kDiagonal = 7;
 constexpr std::size_t kFar = ~std::size_t{0};
+/// On top of that for each layer up or down: a metre of height like two more of way, so that
+/// another storey is always further than this one's far end under it. Of a step, up to so much.
+constexpr double kPerLayer = 1.25;
+constexpr std::size_t kMostClimb = 16;
 /// O's origin is the standing vehicle's body, a leg above the ground.
 constexpr int kStandLayers = 3;
 /// Between the plane that a tile is expected to have and its floor: half a layer of noise, and what
@@ -301,7 +305,7 @@ void FloorSheet::pin_corridor() {
 /// floor that leads there.
 void FloorSheet::flood() {
   std::vector<std::size_t> costs(tiles_.size(), kFar), parents(tiles_.size(), kFar);
-  std::vector<std::vector<std::size_t>> open(kDiagonal + 1);  // a ring
+  std::vector<std::vector<std::size_t>> open(kDiagonal + kMostClimb + 1);  // a ring
   const std::size_t first = index(way_.back());
   costs[first] = 0;
   open[0].push_back(first);
@@ -319,9 +323,11 @@ void FloorSheet::flood() {
         if (!contains(tile_of(t) + step)) continue;
         const std::size_t there = index(tile_of(t) + step);
         const Tile& next = tiles_[there];
-        const std::size_t reached = cost + (s < 4 ? kStraight : kDiagonal);
-        if (next.done || reached >= costs[there]) continue;
         const double expected = shifted(tiles_[t].label.plane, step).height;
+        const double climb = kPerLayer * std::abs(expected - tiles_[t].label.plane.height);
+        const std::size_t reached = cost + (s < 4 ? kStraight : kDiagonal) +
+                                    std::min(static_cast<std::size_t>(climb), kMostClimb);
+        if (next.done || reached >= costs[there]) continue;
         if (next.pinned && std::abs(expected - next.label.plane.height) > kBrink) continue;
         costs[there] = reached;
         parents[there] = t;

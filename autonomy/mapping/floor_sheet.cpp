@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <deque>
 #include <span>
 #include <utility>
 
@@ -14,11 +15,6 @@ namespace {
 constexpr std::array<int, 8> kDx{1, 0, -1, 0, 1, -1, -1, 1}, kDy{0, 1, 0, -1, 1, 1, -1, -1};
 /// Cost of a step between tiles: 7/5 is the square root of 2 to 1 %.
 constexpr std::size_t kStraight = 5, kDiagonal = 7;
-constexpr std::size_t kFar = ~std::size_t{0};
-/// On top of that for each layer up or down: a metre of height like two more of way, so that
-/// another storey is always further than this one's far end under it. Of a step, up to so much.
-constexpr double kPerLayer = 1.25;
-constexpr std::size_t kMostClimb = 16;
 /// O's origin is the standing vehicle's body, a leg above the ground.
 constexpr int kStandLayers = 3;
 /// Between the plane that a tile is expected to have and its floor: half a layer of noise, and what
@@ -34,6 +30,18 @@ constexpr double kSame = 1.0;
 constexpr double kBrink = 10;
 /// Along the way the floor of neighbours is the same storey within what the steepest ramp rises.
 constexpr double kStorey = 14;
+/// Floor that is higher than the vehicle's by more is another storey's, or on the way there: more
+/// than what a vehicle passes on a ramp while it looks down, less than a storey.
+constexpr double kOwnStorey = 20;
+/// A floor that sinks by so much from one tile to the next dives: a ramp of 20 degrees. Of one that
+/// goes down the far end is not seen from its top, for rays that graze do not come back: it goes on
+/// for so many tiles. What lies so much higher is not its own.
+constexpr double kDive = 3;
+constexpr int kMostDived = 10;
+constexpr double kUnder = 25;
+/// Tiles that a floor goes on under another: enough unknown area to be worth a flight.
+constexpr int kMostUnder = 3;
+constexpr double kLevel = 0.2;              ///< layers per column: floors of less slope are level
 constexpr int kLeastForSlope = 12;          ///< columns
 constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
 constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
@@ -242,7 +250,9 @@ std::vector<std::size_t> FloorSheet::spread() {
   }
   follow_way();
   pin_corridor();
-  flood();
+  join_seen();
+  go_under();
+  fill_unseen();
   std::vector<std::size_t> changed;
   std::vector<std::uint64_t> brinks(tiles_.size(), 0);
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
@@ -301,37 +311,90 @@ void FloorSheet::pin_corridor() {
   for (Tile& tile : tiles_) tile.done = false;
 }
 
-/// From the vehicle outwards, nearest tiles first. What is pinned is passed through where it is the
-/// floor that leads there.
-void FloorSheet::flood() {
-  std::vector<std::size_t> costs(tiles_.size(), kFar), parents(tiles_.size(), kFar);
-  std::vector<std::vector<std::size_t>> open(kDiagonal + kMostClimb + 1);  // a ring
-  const std::size_t first = index(way_.back());
-  costs[first] = 0;
-  open[0].push_back(first);
-  std::size_t waiting = 1;
+/// Not from what lies a storey above the vehicle: it was left, or is still to be climbed to, and
+/// may lie over what is to be explored down here.
+bool FloorSheet::leads_on(std::size_t t) const {
+  const double here = tiles_[index(way_.back())].label.plane.height;
+  return tiles_[t].label.plane.height <= here + kOwnStorey;
+}
+
+/// From the corridor over all that goes on with it. Where floors lie above each other a tile has
+/// the lowest that is joined; one that dives under another goes on under it, unseen.
+void FloorSheet::join_seen() {
+  std::deque<std::size_t> open;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (tiles_[t].pinned) open.push_back(t);
+  }
+  for (; !open.empty(); open.pop_front()) {
+    const std::size_t t = open.front();
+    if (!leads_on(t)) continue;
+    for (std::size_t s = 0; s < kDx.size(); ++s) {
+      const Eigen::Vector2i step(kDx[s], kDy[s]);
+      if (!contains(tile_of(t) + step)) continue;
+      const std::size_t there = index(tile_of(t) + step);
+      const Label& before = tiles_[there].label;
+      const TilePlane expected = shifted(tiles_[t].label.plane, step);
+      if (tiles_[there].pinned) continue;
+      if (before.seen && expected.height > before.plane.height - kBrink) continue;
+      Label label = go_on(tiles_[t].label, step, there);
+      if (!label.seen) {
+        const bool dives = s < 4 && label.guessed <= kMostDived &&
+                           expected.height <= tiles_[t].label.plane.height - kDive;
+        if (!dives) continue;
+        label.plane = expected;
+      }
+      const double above = label.plane.height - before.plane.height;
+      const bool better = label.seen ? above <= (before.seen ? -kBrink : kUnder)
+                                     : above <= (before.seen ? -kUnder : -kBrink);
+      if (before.known && !better) continue;
+      tiles_[there].label = label;
+      open.push_back(there);
+    }
+  }
+}
+
+/// A floor that comes to lie under another's goes on under it, unseen, for a few tiles: there is
+/// something to explore.
+void FloorSheet::go_under() {
+  for (int ring = 0; ring < kMostUnder; ++ring) {
+    std::vector<std::pair<std::size_t, Label>> under;
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      if (!tiles_[t].label.known || !leads_on(t)) continue;
+      for (std::size_t s = 0; s < 4; ++s) {
+        const Eigen::Vector2i step(kDx[s], kDy[s]);
+        if (!contains(tile_of(t) + step)) continue;
+        const std::size_t there = index(tile_of(t) + step);
+        const double expected = shifted(tiles_[t].label.plane, step).height;
+        const Tile& over = tiles_[there];
+        const bool roof = over.label.seen && over.label.plane.rise.norm() < kLevel;  // no ramp
+        if (over.pinned || !roof || over.label.plane.height - expected <= kUnder) continue;
+        under.emplace_back(there, go_on(tiles_[t].label, step, there));
+      }
+    }
+    for (const auto& [tile, label] : under) tiles_[tile].label = label;
+  }
+}
+
+/// The others, from their nearest neighbours on.
+void FloorSheet::fill_unseen() {
+  std::vector<std::vector<std::size_t>> open(kDiagonal + 1);  // a ring
+  std::size_t waiting = 0;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (!tiles_[t].label.known || !leads_on(t)) continue;
+    open[0].push_back(t);
+    ++waiting;
+  }
   for (std::size_t cost = 0; waiting > 0; ++cost) {
     std::vector<std::size_t>& bucket = open[cost % open.size()];
     for (std::size_t k = 0; k < bucket.size(); ++k) {
       const std::size_t t = bucket[k];
       --waiting;
-      if (tiles_[t].done || costs[t] != cost) continue;
-      if (!tiles_[t].pinned) settle(t, parents[t]);
-      tiles_[t].done = true;
+      if (std::exchange(tiles_[t].done, true)) continue;
+      if (!tiles_[t].label.known) settle(t);
       for (std::size_t s = 0; s < kDx.size(); ++s) {
-        const Eigen::Vector2i step(kDx[s], kDy[s]);
-        if (!contains(tile_of(t) + step)) continue;
-        const std::size_t there = index(tile_of(t) + step);
-        const Tile& next = tiles_[there];
-        const double expected = shifted(tiles_[t].label.plane, step).height;
-        const double climb = kPerLayer * std::abs(expected - tiles_[t].label.plane.height);
-        const std::size_t reached = cost + (s < 4 ? kStraight : kDiagonal) +
-                                    std::min(static_cast<std::size_t>(climb), kMostClimb);
-        if (next.done || reached >= costs[there]) continue;
-        if (next.pinned && std::abs(expected - next.label.plane.height) > kBrink) continue;
-        costs[there] = reached;
-        parents[there] = t;
-        open[reached % open.size()].push_back(there);
+        const Eigen::Vector2i there = tile_of(t) + Eigen::Vector2i(kDx[s], kDy[s]);
+        if (!contains(there) || tiles_[index(there)].label.known) continue;
+        open[(cost + (s < 4 ? kStraight : kDiagonal)) % open.size()].push_back(index(there));
         ++waiting;
       }
     }
@@ -339,21 +402,17 @@ void FloorSheet::flood() {
   }
 }
 
-/// A tile takes the floor that it has if any neighbour's that is nearer goes on into it; otherwise
-/// the nearest one's, gone on.
-void FloorSheet::settle(std::size_t t, std::size_t parent) {
+/// The floor that it has if that of any neighbour goes on into it; otherwise a neighbour's, gone
+/// on.
+void FloorSheet::settle(std::size_t t) {
   const Eigen::Vector2i here = tile_of(t);
-  tiles_[t].label = go_on(tiles_[parent].label, here - tile_of(parent), t);
-  if (tiles_[t].label.seen || tiles_[t].feet.empty()) return;
-  for (std::size_t s = 0; s < kDx.size(); ++s) {
+  for (std::size_t s = 0; s < kDx.size() && !tiles_[t].label.seen; ++s) {
     const Eigen::Vector2i step(kDx[s], kDy[s]);
     if (!contains(here - step)) continue;
     const std::size_t from = index(here - step);
-    if (from == parent || !tiles_[from].done || !tiles_[from].label.seen) continue;
+    if (!tiles_[from].done) continue;
     const Label label = go_on(tiles_[from].label, step, t);
-    if (!label.seen) continue;
-    tiles_[t].label = label;
-    return;
+    if (label.seen || !tiles_[t].label.known) tiles_[t].label = label;
   }
 }
 
@@ -398,7 +457,9 @@ std::optional<TilePlane> FloorSheet::find_floor(const std::vector<Feet>& feet,
   if (samples.count < support_) return std::nullopt;
   plane = fit_plane(samples, expected.rise);
   if (plane.rise.norm() > max_slope_) return std::nullopt;
-  return plane;
+  // A ramp shows its slope; what only lies near where it would go on is the foot of a wall.
+  const bool shown = samples.count >= kLeastForSlope || plane.rise.norm() < kLevel;
+  return shown ? std::optional(plane) : std::nullopt;
 }
 
 void FloorSheet::find_brinks(std::vector<std::uint64_t>& brinks) const {

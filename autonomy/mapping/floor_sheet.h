@@ -60,10 +60,11 @@ class ColumnLayers {
 /// tile's. So it follows ramps, and does not climb a car, whose foot nobody sees. Where nothing was
 /// seen the plane goes on and levels out, and takes up what it meets at its height.
 ///
-/// Where storeys lie above each other a tile has the floor that is nearest on foot from where the
-/// vehicle is now. Within `kCorridor_m` of the way home it keeps the floor that was flown over,
-/// whatever other storey comes near: the way home stays known. Where neighbours' floors do not meet
-/// the higher one ends: its last columns are brinks.
+/// Where storeys lie above each other a tile has the lowest floor that is joined to the vehicle's,
+/// and nothing is followed that lies more than 2 m above the vehicle's floor. Within `kCorridor_m`
+/// of the way home a tile keeps the floor that was flown over, whatever other storey comes near:
+/// the way home stays known. Where neighbours' floors do not meet the higher one ends: its last
+/// columns are brinks.
 class FloorSheet {
  public:
   /// Voxels of one layer that are occupied over one that is not: where a surface or an object
@@ -93,7 +94,7 @@ class FloorSheet {
   /// Columns at which the floor of a tile ends above that of its neighbour.
   [[nodiscard]] std::uint64_t brinks(std::size_t tile) const { return tiles_[tile].brinks; }
 
-  static constexpr double kCorridor_m = 3.0;
+  static constexpr double kCorridor_m = 2.0;
 
  private:
   struct Label {
@@ -108,7 +109,7 @@ class FloorSheet {
     Label shown;  ///< as handed out: stays while the label says the same
     std::uint64_t brinks = 0;
     bool pinned = false;  ///< in the corridor
-    bool done = false;
+    bool done = false;    ///< handed on to its neighbours
   };
 
   [[nodiscard]] std::size_t index(const Eigen::Vector2i& tile) const {
@@ -123,8 +124,11 @@ class FloorSheet {
   void step_to(const Eigen::Vector2i& tile);
   void follow_way();
   void pin_corridor();
-  void flood();
-  void settle(std::size_t tile, std::size_t parent);
+  [[nodiscard]] bool leads_on(std::size_t tile) const;
+  void join_seen();
+  void go_under();
+  void fill_unseen();
+  void settle(std::size_t tile);
   void find_brinks(std::vector<std::uint64_t>& brinks) const;
   /// The floor of `tile` if that of a neighbour goes on into it.
   [[nodiscard]] Label go_on(const Label& from, const Eigen::Vector2i& step, std::size_t tile) const;

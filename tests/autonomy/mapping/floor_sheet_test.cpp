@@ -34,14 +34,14 @@ class Site {
       for (int x = x0; x < x1; ++x) at(x, y).push_back(static_cast<int>(std::floor(height(x, y))));
     }
   }
-  void give_to(FloorSheet& sheet) {
+  void give_to(FloorSheet& sheet, int from_layer = -1000) {
     for (int ty = 0; ty < kHeight; ++ty) {
       for (int tx = 0; tx < kWidth; ++tx) {
         std::map<int, std::uint64_t> feet;
         for (int y = 0; y < 8; ++y) {
           for (int x = 0; x < 8; ++x) {
             for (const int layer : at(8 * tx + x, 8 * ty + y)) {
-              feet[layer] |= std::uint64_t{1} << column_bit(x, y);
+              if (layer >= from_layer) feet[layer] |= std::uint64_t{1} << column_bit(x, y);
             }
           }
         }
@@ -117,12 +117,17 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     FloorSheet sheet = make_sheet();
     Site site = make_garage(seed);
-    site.give_to(sheet);
+    site.give_to(sheet, -60);  // from above
     sheet.note_place({0, 10});
     sheet.spread();
     EXPECT_NEAR(height(sheet, 1, 10), 0, 1);
     EXPECT_NEAR(height(sheet, 1, 1), 0, 1);
-    EXPECT_NEAR(height(sheet, 10, 1), 0, 1);  // the yard, not the hall under it
+    EXPECT_NEAR(height(sheet, 10, 1), 0, 1);
+    EXPECT_NEAR(height(sheet, 15, 10), -slope * (8 * 15 + 4 - 24), 1.5);  // under the yard
+    EXPECT_LT(height(sheet, 17, 10), -60);  // goes on down, unseen, though the yard is seen there
+    EXPECT_FALSE(sheet.is_seen(tile(17, 10)));
+    site.give_to(sheet);
+    sheet.spread();
     for (int x = 3; x < 20; ++x) {
       const double expected = std::max(-80.0, -slope * (8 * x + 4 - 24));
       EXPECT_NEAR(height(sheet, x, 10), expected, 1.5) << x;
@@ -149,7 +154,7 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
     for (int x = 3; x < 17; ++x) {
       EXPECT_NEAR(height(sheet, x, 10), std::max(-80.0, -slope * (8 * x + 4 - 24)), 1.5) << x;
     }
-    EXPECT_NE(sheet.brinks(tile(1, 7)) | sheet.brinks(tile(1, 6)), 0U);  // the yard ends there
+    EXPECT_NE(sheet.brinks(tile(1, 8)), 0U);  // the yard ends there
     EXPECT_EQ(sheet.brinks(tile(10, 4)), 0U);
   }
 }

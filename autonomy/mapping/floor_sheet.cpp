@@ -41,7 +41,9 @@ constexpr int kMostDived = 10;
 constexpr double kUnder = 25;
 /// Tiles that a floor goes on under another: enough unknown area to be worth a flight.
 constexpr int kMostUnder = 3;
-constexpr double kLevel = 0.2;              ///< layers per column: floors of less slope are level
+constexpr double kLevel = 0.2;  ///< layers per column: floors of less slope are level
+/// Layers of the vehicle above the floor that it flies over.
+constexpr double kLeastAbove = 3, kMostAbove = 35;
 constexpr int kLeastForSlope = 12;          ///< columns
 constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
 constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
@@ -211,29 +213,29 @@ void FloorSheet::set_feet(std::size_t tile, std::vector<Feet> feet) {
   changed_ = true;
 }
 
-void FloorSheet::note_place(const Eigen::Vector2i& tile) {
+void FloorSheet::note_place(const Eigen::Vector2i& tile, int layer) {
   if (!contains(tile)) return;
   if (way_.empty()) {
-    way_.push_back(tile);
+    way_.push_back({tile, layer});
     changed_ = true;
     return;
   }
-  while (way_.back() != tile) {
-    const Eigen::Vector2i left = tile - way_.back();
-    step_to(way_.back() + left.cwiseSign());
+  while (way_.back().tile != tile) {
+    const Eigen::Vector2i left = tile - way_.back().tile;
+    step_to(way_.back().tile + left.cwiseSign(), layer);
     changed_ = true;
   }
 }
 
 /// A loop is cut where the way comes beside itself on the same storey.
-void FloorSheet::step_to(const Eigen::Vector2i& tile) {
-  const double here = tiles_[index(way_.back())].shown.plane.height;
-  const auto again = std::find_if(way_.begin(), way_.end() - 1, [&](const Eigen::Vector2i& p) {
-    return (p - tile).cwiseAbs().maxCoeff() <= 1 &&
-           std::abs(tiles_[index(p)].shown.plane.height - here) <= kStorey;
+void FloorSheet::step_to(const Eigen::Vector2i& tile, int layer) {
+  const double here = tiles_[index(way_.back().tile)].shown.plane.height;
+  const auto again = std::find_if(way_.begin(), way_.end() - 1, [&](const Place& p) {
+    return (p.tile - tile).cwiseAbs().maxCoeff() <= 1 &&
+           std::abs(tiles_[index(p.tile)].shown.plane.height - here) <= kStorey;
   });
   if (again != way_.end() - 1) way_.erase(again + 1, way_.end());
-  if (way_.back() != tile) way_.push_back(tile);
+  if (way_.back().tile != tile) way_.push_back({tile, layer});
 }
 
 std::optional<TilePlane> FloorSheet::plane(std::size_t tile) const {
@@ -279,9 +281,16 @@ void FloorSheet::follow_way() {
   label.plane.height = -0.5 * kStandLayers;
   label.guessed = kMostGuessedLayers * kGuessedPerLayer;  // the leg's length is not known here
   for (std::size_t k = 0; k < way_.size(); ++k) {
-    const Eigen::Vector2i step = way_[k] - way_[k == 0 ? 0 : k - 1];
-    const std::size_t t = index(way_[k]);
-    label = go_on(label, step, t);
+    const Place& place = way_[k];
+    const std::size_t t = index(place.tile);
+    label = go_on(label, place.tile - way_[k == 0 ? 0 : k - 1].tile, t);
+    // Over an edge it comes to fly over another floor, which was known before from elsewhere.
+    const Label& before = tiles_[t].shown;
+    const double above = place.layer - before.plane.height;
+    const bool follows = label.seen && label.plane.height <= place.layer - kLeastAbove;
+    if (!follows && before.known && before.seen && above >= kLeastAbove && above <= kMostAbove) {
+      label = before;
+    }
     tiles_[t].label = label;
     tiles_[t].pinned = true;
   }
@@ -289,7 +298,9 @@ void FloorSheet::follow_way() {
 
 void FloorSheet::pin_corridor() {
   std::vector<std::vector<std::size_t>> open(corridor_ + kDiagonal + 1);
-  for (auto place = way_.rbegin(); place != way_.rend(); ++place) open[0].push_back(index(*place));
+  for (auto place = way_.rbegin(); place != way_.rend(); ++place) {
+    open[0].push_back(index(place->tile));
+  }
   for (std::size_t cost = 0; cost <= corridor_; ++cost) {
     for (std::size_t k = 0; k < open[cost].size(); ++k) {
       const std::size_t t = open[cost][k];
@@ -314,7 +325,7 @@ void FloorSheet::pin_corridor() {
 /// Not from what lies a storey above the vehicle: it was left, or is still to be climbed to, and
 /// may lie over what is to be explored down here.
 bool FloorSheet::leads_on(std::size_t t) const {
-  const double here = tiles_[index(way_.back())].label.plane.height;
+  const double here = tiles_[index(way_.back().tile)].label.plane.height;
   return tiles_[t].label.plane.height <= here + kOwnStorey;
 }
 

@@ -81,8 +81,9 @@ class FloorSheet {
 
   /// What was seen in a tile, layers ascending.
   void set_feet(std::size_t tile, std::vector<Feet> feet);
-  /// Where the vehicle is: its way goes on to this tile. Outside the map: nothing.
-  void note_place(const Eigen::Vector2i& tile);
+  /// Where the vehicle is: its way goes on to this tile, at this height in layers. Outside the map:
+  /// nothing.
+  void note_place(const Eigen::Vector2i& tile, int layer);
   /// Works the sheet out anew, if anything was said since it last did.
   /// @return tiles whose plane or brinks have changed
   std::vector<std::size_t> spread();
@@ -103,6 +104,10 @@ class FloorSheet {
     bool seen = false;
     int guessed = 0;  ///< tiles since the last that was seen
   };
+  struct Place {
+    Eigen::Vector2i tile = Eigen::Vector2i::Zero();
+    int layer = 0;  ///< that the vehicle flew in
+  };
   struct Tile {
     std::vector<Feet> feet;
     Label label;  ///< as of this spreading
@@ -121,7 +126,7 @@ class FloorSheet {
   [[nodiscard]] bool contains(const Eigen::Vector2i& tile) const {
     return tile.minCoeff() >= 0 && tile.x() < width_ && tile.y() < height_;
   }
-  void step_to(const Eigen::Vector2i& tile);
+  void step_to(const Eigen::Vector2i& tile, int layer);
   void follow_way();
   void pin_corridor();
   [[nodiscard]] bool leads_on(std::size_t tile) const;
@@ -141,7 +146,7 @@ class FloorSheet {
   std::size_t corridor_;  ///< cost
   bool changed_ = true;
   std::vector<Tile> tiles_;
-  std::vector<Eigen::Vector2i> way_;  ///< from the start to the vehicle, without loops
+  std::vector<Place> way_;  ///< from the start to the vehicle, without loops
 };
 
 }  // namespace arex

@@ -57,10 +57,12 @@ void HeightBand::note(const BrickChange& change) {
   tiles_[static_cast<std::size_t>(at.y() * brick_count_.x() + at.x())].dirty = true;
 }
 
-void HeightBand::note_place(const Vec2& p_O) {
+void HeightBand::note_place(const Vec3& p_O) {
   if (!sheet_) return;
   const double tile_m = map_.ground.tile_m;
-  sheet_->note_place(((p_O - map_.ground.origin) / tile_m).array().floor().cast<int>());
+  const Vec2 at = (p_O.head<2>() - map_.ground.origin) / tile_m;
+  sheet_->note_place(at.array().floor().cast<int>(),
+                     static_cast<int>(std::floor(p_O.z() / resolution_m_)));
   dirty_ = true;
 }
 

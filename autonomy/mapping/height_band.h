@@ -53,7 +53,7 @@ class HeightBand {
   /// Marks the tile of a brick that changed.
   void note(const BrickChange& change);
   /// Where the vehicle is: with BandReference::kFloor, from where its floor goes on.
-  void note_place(const Vec2& p_O);
+  void note_place(const Vec3& p_O);
 
   /// Brings the map up to date. `states_of(brick)` gives a brick's States.
   template <class StatesOf>

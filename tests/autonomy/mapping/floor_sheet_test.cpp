@@ -118,7 +118,7 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
     FloorSheet sheet = make_sheet();
     Site site = make_garage(seed);
     site.give_to(sheet, -60);  // from above
-    sheet.note_place({0, 10});
+    sheet.note_place({0, 10}, 13);
     sheet.spread();
     EXPECT_NEAR(height(sheet, 1, 10), 0, 1);
     EXPECT_NEAR(height(sheet, 1, 1), 0, 1);
@@ -136,15 +136,16 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
     EXPECT_NEAR(sheet.plane(tile(10, 10))->rise.x(), -slope, 0.08);
     // Down, and off to the side: now the hall's floor, but the way home stays.
     for (int x = 1; x < 24; ++x) {
-      sheet.note_place({x, 10});
+      sheet.note_place(
+          {x, 10}, static_cast<int>(15 - std::min(80.0, std::max(0.0, slope * (8 * x + 4 - 24)))));
       sheet.spread();
     }
     for (int y = 10; y > 3; --y) {
-      sheet.note_place({24, y});
+      sheet.note_place({24, y}, -65);
       sheet.spread();
     }
     for (int x = 24; x > 8; --x) {
-      sheet.note_place({x, 4});
+      sheet.note_place({x, 4}, -65);
       sheet.spread();
     }
     EXPECT_NEAR(height(sheet, 10, 1), -80, 1);
@@ -157,6 +158,26 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
     EXPECT_NE(sheet.brinks(tile(1, 8)), 0U);  // the yard ends there
     EXPECT_EQ(sheet.brinks(tile(10, 4)), 0U);
   }
+}
+
+// From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
+TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
+  FloorSheet sheet = make_sheet();
+  Site site = make_garage(4);
+  site.give_to(sheet, -60);
+  for (int y = 10; y > 5; --y) sheet.note_place({1, y}, 13);
+  for (int x = 1; x < 7; ++x) sheet.note_place({x, 5}, 13);
+  sheet.spread();
+  const double ramp = height(sheet, 7, 9);
+  EXPECT_NEAR(ramp, -std::tan(M_PI / 6) * (8 * 7 + 4 - 24), 1.5);
+  for (int y = 6; y < 10; ++y) sheet.note_place({7, y}, y < 8 ? 13 : 8);
+  for (int x = 8; x < 11; ++x) {
+    sheet.note_place({x, 9}, static_cast<int>(15 - std::tan(M_PI / 6) * (8 * x + 4 - 24)));
+  }
+  sheet.spread();
+  EXPECT_NEAR(height(sheet, 7, 9), ramp, 1.5);
+  EXPECT_NEAR(height(sheet, 10, 9), -std::tan(M_PI / 6) * (8 * 10 + 4 - 24), 1.5);
+  EXPECT_NEAR(height(sheet, 14, 9), -std::tan(M_PI / 6) * (8 * 14 + 4 - 24), 1.5);
 }
 
 TEST(FloorSheet, ClimbsNoCarAndFindsTheFloorBehindIt) {
@@ -173,7 +194,7 @@ TEST(FloorSheet, ClimbsNoCarAndFindsTheFloorBehindIt) {
     }
   }
   site.give_to(sheet);
-  for (int x = 0; x < 5; ++x) sheet.note_place({x, 8});
+  for (int x = 0; x < 5; ++x) sheet.note_place({x, 8}, 13);
   sheet.spread();
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) EXPECT_NEAR(height(sheet, x, y), 0, 0.7) << x << " " << y;
@@ -187,7 +208,7 @@ TEST(FloorSheet, GoesOnOverTheUnseenAndTakesUpTheFloorBeyond) {
   site.add(0, 80, 0, 160, tilted);
   site.add(144, 240, 0, 160, tilted);
   site.give_to(sheet);
-  sheet.note_place({1, 10});
+  sheet.note_place({1, 10}, 13);
   sheet.spread();
   EXPECT_FALSE(sheet.is_seen(tile(13, 10)));
   EXPECT_NEAR(height(sheet, 13, 10), 1, 1.5);
@@ -199,10 +220,10 @@ TEST(FloorSheet, HandsOutAPlaneAnewOnlyWhenItSaysSomethingElse) {
   FloorSheet sheet = make_sheet();
   Site site = make_garage(7);
   site.give_to(sheet);
-  sheet.note_place({0, 10});
+  sheet.note_place({0, 10}, 13);
   EXPECT_GE(sheet.spread().size(), static_cast<std::size_t>(kWidth * kHeight));
   EXPECT_TRUE(sheet.spread().empty());  // nothing was said
-  sheet.note_place({1, 10});
+  sheet.note_place({1, 10}, 13);
   EXPECT_LT(sheet.spread().size(), 60U);
 }
 

@@ -348,7 +348,7 @@ TEST(GlobalMap, StandsItsHeightBandOnARampColumnByColumn) {
   painter.occupied({-2.05, 3.05, ramp_height(-2.05) + 0.2});  // a kerb
   painter.show();
   EXPECT_EQ(map.occupancy_2d().at({10, 10}), OccupancyMap2D::kUnknown);  // nobody has stood there
-  map.note_place({-7, 0});
+  map.note_place({-7, 0, 1.5});
   const OccupancyMap2D& out = map.occupancy_2d();
   int free = 0, occupied = 0;
   for (const std::int8_t c : out.cells) {

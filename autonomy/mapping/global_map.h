@@ -27,6 +27,8 @@ class GlobalMap {
   [[nodiscard]] const CellBox& box() const { return box_; }
   /// Takes one LiDAR frame. @pre rays were clipped to a box that holds what box() sees of it.
   void add_frame(const RayCaster& rays);
+  /// Where the vehicle is, for a height band that stands on the floor under its way (HeightBand).
+  void note_place(const Vec3& p_O) { band_.note_place(p_O); }
 
   /// -1 unknown, 0 free, 1 occupied; unknown outside the bounds.
   [[nodiscard]] int state(const Cell& cell) const;

@@ -26,7 +26,8 @@ HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const
       min_free_(config.min_free_cells),
       slope_(config.ground_max_slope * kBrickCells),
       support_(config.ground_support),
-      relief_(static_cast<int>(std::ceil(slope_)) + kFloorLayers),
+      relief_((config.band == BandReference::kFloor ? 1 : static_cast<int>(std::ceil(slope_))) +
+              kFloorLayers),
       air_(static_cast<int>(std::lround(kAir_m / resolution_m))),
       box_(box),
       brick_low_(brick_low),
@@ -39,17 +40,30 @@ HeightBand::HeightBand(const GlobalMapConfig& config, double resolution_m, const
   map_.cells.assign(count, OccupancyMap2D::kUnknown);
   map_.floor.top.assign(count, FloorMap::kUnknown);
   map_.floor.overhead.assign(count, FloorMap::kNothing);
-  if (reference_ != BandReference::kGround) return;
+  if (reference_ == BandReference::kAbsolute) return;
   map_.ground.tile_m = resolution_m * kBrickCells;
   map_.ground.origin = brick_low.head<2>().cast<double>() * map_.ground.tile_m;
   map_.ground.width = brick_count.x();
   map_.ground.heights.assign(tiles_.size(), std::numeric_limits<float>::quiet_NaN());
+  if (reference_ != BandReference::kFloor) return;
+  sheet_.emplace(brick_count.x(), brick_count.y(), map_.ground.tile_m, config.ground_max_slope,
+                 config.ground_support);
+  map_.ground.rises.assign(tiles_.size(), Eigen::Vector2f::Zero());
 }
 
 void HeightBand::note(const BrickChange& change) {
   const Cell at = change.brick - brick_low_;
   dirty_ = true;
   tiles_[static_cast<std::size_t>(at.y() * brick_count_.x() + at.x())].dirty = true;
+}
+
+void HeightBand::note_place(const Vec3& p_O) {
+  if (!sheet_) return;
+  const double tile_m = map_.ground.tile_m;
+  const Vec2 at = (p_O.head<2>() - map_.ground.origin) / tile_m;
+  sheet_->note_place(at.array().floor().cast<int>(),
+                     static_cast<int>(std::floor(p_O.z() / resolution_m_)));
+  dirty_ = true;
 }
 
 std::uint64_t HeightBand::layer(const BrickMask& mask, int z) {
@@ -85,6 +99,45 @@ void HeightBand::find_ground(Tile& tile) {
     tile.lowest = found;
     ground_changed_ = true;
   }
+}
+
+void HeightBand::find_feet(std::size_t t) {
+  std::vector<FloorSheet::Feet> feet;
+  std::uint64_t below = 0;  // occupied in the layer below
+  for (int k = 0; k < brick_count_.z(); ++k) {
+    const BrickMask* const occupied = column_[static_cast<std::size_t>(k)].occupied;
+    if (occupied == nullptr || *occupied == BrickMask{}) {
+      below = 0;
+      continue;
+    }
+    for (int z = 0; z < kBrickCells; ++z) {
+      const std::uint64_t here = layer(*occupied, z);
+      const int at = (brick_low_.z() + k) * kBrickCells + z;
+      if ((here & ~below) != 0) feet.push_back({at, here & ~below});
+      below = here;
+    }
+  }
+  sheet_->set_feet(t, std::move(feet));
+}
+
+void HeightBand::spread_sheet() {
+  for (const std::size_t t : sheet_->spread()) {
+    tiles_[t].dirty = true;
+    const auto plane = sheet_->plane(t);
+    map_.ground.heights[t] = plane ? static_cast<float>(plane->height * resolution_m_)
+                                   : std::numeric_limits<float>::quiet_NaN();
+    if (plane) map_.ground.rises[t] = plane->rise.cast<float>();
+  }
+}
+
+std::optional<ColumnLayers> HeightBand::ground_of(std::size_t t) const {
+  if (reference_ == BandReference::kAbsolute) return ColumnLayers(0);
+  if (sheet_) {
+    const auto plane = sheet_->plane(t);
+    return plane ? std::optional(ColumnLayers(*plane)) : std::nullopt;
+  }
+  if (tiles_[t].ground >= kNoGround / 2) return std::nullopt;
+  return ColumnLayers(tiles_[t].ground);
 }
 
 void HeightBand::spread_ground() {
@@ -140,19 +193,21 @@ std::size_t HeightBand::cell_of_bit(std::size_t t, unsigned bit) const {
 }
 
 void HeightBand::evaluate(std::size_t t) {
-  const int base = reference_ == BandReference::kGround ? tiles_[t].ground : 0;
-  std::uint64_t occupied = 0;
+  const std::optional<ColumnLayers> base =
+      reference_ == BandReference::kAbsolute ? std::optional(ColumnLayers(0)) : ground_of(t);
+  std::uint64_t occupied = sheet_ ? sheet_->brinks(t) : 0;
   std::array<std::uint64_t, 9> free{};  // free[n]: columns with at least n free cells
   free[0] = ~std::uint64_t{0};
-  if (base < kNoGround / 2) {
-    const int low = std::max(base + band_low_, box_.low.z());
-    const int high = std::min(base + band_high_, box_.high.z());
+  if (base) {
+    const int low = std::max(base->lowest() + band_low_, box_.low.z());
+    const int high = std::min(base->highest() + band_high_, box_.high.z());
     for (int z = low; z < high; ++z) {
       const int in = z - brick_low_.z() * kBrickCells;
       const States& states = column_[static_cast<std::size_t>(in / kBrickCells)];
       if (states.known == nullptr) continue;
-      const std::uint64_t full = layer(*states.occupied, in % kBrickCells);
-      const std::uint64_t empty = layer(*states.known, in % kBrickCells) & ~full;
+      const std::uint64_t band = base->between(z - band_high_ + 1, z - band_low_ + 1);
+      const std::uint64_t full = layer(*states.occupied, in % kBrickCells) & band;
+      const std::uint64_t empty = layer(*states.known, in % kBrickCells) & band & ~full;
       occupied |= full;
       for (int n = min_free_; n > 0; --n) {
         free[static_cast<std::size_t>(n)] |= free[static_cast<std::size_t>(n - 1)] & empty;
@@ -179,27 +234,26 @@ void HeightBand::survey_floor(std::size_t t) {
       layers[static_cast<std::size_t>(std::countr_zero(bits))] = static_cast<std::int16_t>(z);
     }
   };
-  const int ground = tiles_[t].ground;
-  const bool has_ground = ground < kNoGround / 2;
-  const int air_low = ground + relief_, air_high = ground + air_;
-  std::uint64_t covered = 0, unknown = has_ground ? 0 : ~std::uint64_t{0};
-  for (int z = has_ground ? std::max(ground - 1, box_.low.z()) : box_.high.z(); z < box_.high.z();
-       ++z) {
+  const std::optional<ColumnLayers> ground = ground_of(t);
+  std::uint64_t covered = 0, unknown = ground ? 0 : ~std::uint64_t{0};
+  for (int z = ground ? std::max(ground->lowest() - 1, box_.low.z()) : box_.high.z();
+       z < box_.high.z(); ++z) {
     const int in = z - brick_low_.z() * kBrickCells;
     const States& states = column_[static_cast<std::size_t>(in / kBrickCells)];
-    if (z >= air_high && (states.known == nullptr || *states.occupied == BrickMask{})) {
+    if (z >= ground->highest() + air_ &&
+        (states.known == nullptr || *states.occupied == BrickMask{})) {
       z += kBrickCells - 1 - in % kBrickCells;  // nothing hangs in this brick
       continue;
     }
     const std::uint64_t known = states.known ? layer(*states.known, in % kBrickCells) : 0;
     const std::uint64_t full = states.known ? layer(*states.occupied, in % kBrickCells) : 0;
-    if (z < air_low) {
-      set(full, z, top);
-      continue;
-    }
-    set(full & ~covered, z, overhead);
-    covered |= full;
-    if (z < air_high) unknown |= ~known;
+    const std::uint64_t on_floor = ground->between(z - relief_ + 1, z + 2);
+    const std::uint64_t above = ground->between(ground->lowest(), z - relief_ + 1);
+    const std::uint64_t in_air = above & ground->between(z - air_ + 1, z + 1);
+    set(full & on_floor, z, top);
+    set(full & above & ~covered, z, overhead);
+    covered |= full & above;
+    unknown |= ~known & in_air;
   }
   set(unknown & ~covered, FloorMap::kUnknown, top);
   for (unsigned i = 0; i < 64; ++i) {

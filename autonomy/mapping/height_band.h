@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "mapping/brick.h"
+#include "mapping/floor_sheet.h"
 #include "mapping/mapping_config.h"
 #include "mapping/occupancy_map_2d.h"
 
@@ -28,7 +30,9 @@ namespace arex {
 /// ground, estimated from the map itself per tile of 8 x 8 columns: the lowest two layers with
 /// `ground_support` occupied voxels, limited by what the neighbours allow at `ground_max_slope`, so
 /// that a tile in which only a trunk was seen takes its neighbours' ground. No tile, no ground: the
-/// tile stays unknown. Works on 64 columns at a time.
+/// tile stays unknown. With BandReference::kFloor it stands, column by column, on the floor that
+/// goes on from under the vehicle's way (FloorSheet), whatever lies above or below: on ramps and in
+/// several storeys. Works on 64 columns at a time.
 ///
 /// Beside the band it says what it would be to land on a column (FloorMap): all that is occupied
 /// within a tile's relief about the ground is floor, with two layers for its noise; what is
@@ -48,6 +52,8 @@ class HeightBand {
 
   /// Marks the tile of a brick that changed.
   void note(const BrickChange& change);
+  /// Where the vehicle is: with BandReference::kFloor, from where its floor goes on.
+  void note_place(const Vec3& p_O);
 
   /// Brings the map up to date. `states_of(brick)` gives a brick's States.
   template <class StatesOf>
@@ -57,8 +63,9 @@ class HeightBand {
     for (std::size_t t = 0; t < tiles_.size(); ++t) {
       if (!tiles_[t].dirty) continue;
       load(t, states_of);
-      find_ground(tiles_[t]);
+      sheet_ ? find_feet(t) : find_ground(tiles_[t]);
     }
+    if (sheet_) spread_sheet();
     if (ground_changed_) spread_ground();
     for (std::size_t t = 0; t < tiles_.size(); ++t) {
       if (!tiles_[t].dirty) continue;
@@ -88,6 +95,10 @@ class HeightBand {
   }
   void find_ground(Tile& tile);
   void spread_ground();
+  void find_feet(std::size_t tile);
+  void spread_sheet();
+  /// The layer of the ground in each column of a tile; none: not known.
+  [[nodiscard]] std::optional<ColumnLayers> ground_of(std::size_t tile) const;
   void evaluate(std::size_t tile);
   /// The floor's top, and what hangs over it, of the loaded column.
   void survey_floor(std::size_t tile);
@@ -109,6 +120,7 @@ class HeightBand {
   std::vector<States> column_;  ///< bricks of the tile at hand
   bool dirty_ = false;          ///< some tile is
   bool ground_changed_ = false;
+  std::optional<FloorSheet> sheet_;  ///< with BandReference::kFloor
   OccupancyMap2D map_;
 };
 

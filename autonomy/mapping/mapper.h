@@ -22,6 +22,8 @@ class Mapper {
   /// The rest of the frame. It may run beside the local grid's next frames, on one thread at a time
   /// and frame by frame.
   void integrate_globally(const RayCaster& rays) { global_.add_frame(rays); }
+  /// Where the vehicle was when the frame was taken (GlobalMap); in the global map's lane.
+  void note_place(const Vec3& p_OB) { global_.note_place(p_OB); }
   /// Both.
   void integrate(const RegisteredScan& scan) { integrate_globally(*integrate_locally(scan)); }
   /// Into the local grid only; without `use_depth` nothing.

@@ -80,9 +80,9 @@ struct LocalGridConfig {
   }
 };
 
-enum class BandReference { kGround, kAbsolute };
-constexpr std::array<std::string_view, 2> enum_names(BandReference) {
-  return {"ground", "absolute"};
+enum class BandReference { kGround, kAbsolute, kFloor };
+constexpr std::array<std::string_view, 3> enum_names(BandReference) {
+  return {"ground", "absolute", "floor"};
 }
 
 /// The map of the whole mission: OctoMap and the 2D occupancy of the exploration.
@@ -105,7 +105,10 @@ struct GlobalMapConfig {
     f("margin_m", margin_m,
       "of a box that is not given, along x and y beyond exploration bounds, entry and waypoints");
     f("range_m", range_m, "LiDAR rays count up to here");
-    f("band", band, "height band of the 2D map: above the ground (forest) or absolute (garage)");
+    f("band", band,
+      "what the height band of the 2D map stands on: ground, the lowest that was seen; floor, what "
+      "goes on from under the vehicle's way, down ramps and in one of several storeys; absolute, "
+      "O's origin (paper)");
     f("band_low_m", band_low_m,
       "lower edge of the band; over the ground's relief within a tile of 8 cells");
     f("band_high_m", band_high_m, "upper edge of the band (paper: 2 m above ground)");

@@ -10,12 +10,13 @@
 namespace arex {
 
 /// Heights of the ground, m in O, in square tiles; row-major, x fastest. NaN where none was seen
-/// nearby.
+/// nearby. Where the tiles have rises the height is that of their middle.
 struct GroundHeights {
   Vec2 origin = Vec2::Zero();  ///< lower corner of tile (0, 0), m
   double tile_m = 0.8;         ///< edge of a tile
   int width = 0;               ///< tiles along x
   std::vector<float> heights;
+  std::vector<Eigen::Vector2f> rises;  ///< slopes of the tiles along x and y; empty: level ones
 
   /// NaN where none was seen nearby, and outside.
   [[nodiscard]] double at(const Vec2& p) const {
@@ -24,7 +25,10 @@ struct GroundHeights {
     if (tile.minCoeff() < 0 || tile.x() >= width || tile.y() * width >= count) {
       return std::numeric_limits<double>::quiet_NaN();
     }
-    return heights[static_cast<std::size_t>(tile.y() * width + tile.x())];
+    const auto i = static_cast<std::size_t>(tile.y() * width + tile.x());
+    if (rises.empty()) return heights[i];
+    const Vec2 middle = origin + tile_m * (tile.cast<double>().array() + 0.5).matrix();
+    return heights[i] + rises[i].cast<double>().dot(p - middle);
   }
 };
 

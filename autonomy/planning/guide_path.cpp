@@ -21,6 +21,8 @@ constexpr double kRounding = 1e-6;
 /// Extra cost of a metre where nothing but the inflation fits, in comfort weights: only where there
 /// is no other way, or one many times as long.
 constexpr double kTight = 4.0;
+/// Between points of a path that follows the ground: less than a tile of the ground's heights.
+constexpr double kLiftStep_m = 0.5;
 
 /// The map grown by everything that the search may enter, as the cost of a metre in each cell. Its
 /// outermost cells are blocked: every neighbour of a passable cell is in it.
@@ -283,6 +285,27 @@ std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to
     const double share = length > 0 ? walked / length : 1.0;
     lifted.push_back({path[i].x(), path[i].y(), from_z + share * (to_z - from_z)});
   }
+  return lifted;
+}
+
+std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z,
+                            const GroundHeights& ground) {
+  std::vector<Vec2> fine;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const Vec2 piece = path[i + 1] - path[i];
+    const int n = std::max(1, static_cast<int>(std::ceil(piece.norm() / kLiftStep_m)));
+    for (int k = 0; k < n; ++k) fine.push_back(path[i] + piece * (static_cast<double>(k) / n));
+  }
+  if (!path.empty()) fine.push_back(path.back());
+  double last = 0;
+  std::vector<double> heights;
+  for (const Vec2& p : fine) {
+    if (const double height = ground.at(p); std::isfinite(height)) last = height;
+    heights.push_back(last);
+  }
+  if (fine.empty()) return {};
+  std::vector<Vec3> lifted = lift_path(fine, from_z - heights.front(), to_z - heights.back());
+  for (std::size_t i = 0; i < lifted.size(); ++i) lifted[i].z() += heights[i];
   return lifted;
 }
 

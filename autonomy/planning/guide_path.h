@@ -23,6 +23,7 @@ struct GuideConfig {
   double comfort_distance_m = 1.5;   ///< nearer than this costs more, linearly
   double comfort_weight = 2.0;       ///< at obstacle_distance_m, per metre flown
   double unknown_weight = 2.0;       ///< extra cost of a metre through the unknown
+  bool follow_ground = false;        ///< handed down from exploration.follow_ground
   int max_expansions = 2'000'000;
 
   void fields(auto& f) {
@@ -65,6 +66,11 @@ struct GuidePath {
 
 /// Gives a 2D polyline heights, linear in its length.
 [[nodiscard]] std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z);
+
+/// The same over mapped ground: what is linear in the length is the height above it, so that the
+/// path follows slopes, with a point each half metre. Where no ground is known it stays level.
+[[nodiscard]] std::vector<Vec3> lift_path(std::span<const Vec2> path, double from_z, double to_z,
+                                          const GroundHeights& ground);
 
 /// From p to the nearest point of a polyline and along it to its end, m.
 [[nodiscard]] double length_ahead(std::span<const Vec3> path, const Vec3& p);

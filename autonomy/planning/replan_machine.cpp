@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -17,6 +18,10 @@ namespace {
 
 constexpr double kAtRest_mps = 0.05;
 constexpr double kClearanceStep_s = 0.05;
+constexpr double kLeastAhead_m = 1.0;  ///< local targets nearer than this are not looked for
+constexpr double kRounding_m = 1e-9;
+constexpr double kBend_m = 0.25;  ///< of a guide above or below the straight way to a local target
+constexpr double kParts[] = {0.25, 0.5, 0.75};
 constexpr double kGridMargin_m = 0.25;  ///< local targets stay this far inside the grid
 /// Shares of the horizon tried for a local target that cannot be reached.
 constexpr double kShorter[] = {1.0, 0.6, 0.35};
@@ -316,16 +321,35 @@ bool ReplanMachine::must_replan_for_space(const GridView& grid, Stamp now) const
 }
 
 Vec3 ReplanMachine::local_target(const GridView& grid, const Vec3& from, double horizon_m) const {
-  Vec3 target = *target_;
-  if (guide_.size() >= 2) {
-    target = point_ahead(guide_, from, horizon_m);
-    if ((target - guide_.back()).norm() < 1e-9) target = *target_;
-  }
-  const Vec3 way = target - from;
-  if (way.norm() > horizon_m) target = from + way * (horizon_m / way.norm());
+  const auto ahead = [&](double way_m) {
+    Vec3 target = *target_;
+    if (guide_.size() >= 2) {
+      target = point_ahead(guide_, from, way_m);
+      if ((target - guide_.back()).norm() < 1e-9) target = *target_;
+    }
+    const Vec3 way = target - from;
+    if (way.norm() > way_m) target = from + way * (way_m / way.norm());
+    return target;
+  };
   const Vec3 low = grid.low.array() + kGridMargin_m;
   const Vec3 high =
       (grid.low + grid.resolution_m * grid.size.cast<double>()).array() - kGridMargin_m;
+  const auto leaves = [&](const Vec3& p) {
+    return p.z() < low.z() - kRounding_m || p.z() > high.z() + kRounding_m;
+  };
+  const auto bends = [&](double way_m, const Vec3& end) {  // a crest, or a ramp's foot
+    return std::any_of(std::begin(kParts), std::end(kParts), [&](double part) {
+      return std::abs(ahead(part * way_m).z() - (from + part * (end - from)).z()) > kBend_m;
+    });
+  };
+  Vec3 target = ahead(horizon_m);
+  // On a ramp the guide leaves the flat grid above or below: as far as the grid shows it, and as
+  // the straight way keeps to its height.
+  while (config_.follow_ground && horizon_m > kLeastAhead_m &&
+         (leaves(target) || bends(horizon_m, target))) {
+    horizon_m = std::max(kLeastAhead_m, horizon_m - grid.resolution_m);
+    target = ahead(horizon_m);
+  }
   return target.cwiseMax(low).cwiseMin(high);
 }
 

@@ -54,6 +54,7 @@ struct ReplanConfig {
   int max_detours = 8;                ///< longer guides granted without getting nearer at all
   double degenerate_speed_mps = 0.8;  ///< handed down: caution's fraction of the speed limit
   bool recovers = true;               ///< false: as the paper, a failed start is the end of it
+  bool follow_ground = false;         ///< handed down: guides go up and down with the ground
   int tries_per_recovery = 3;         ///< plans tried before the next rung
   double back_off_m = 2.0;            ///< along the flown path
   double back_off_speed_mps = 0.7;

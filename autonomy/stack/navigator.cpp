@@ -1,5 +1,7 @@
 #include "stack/navigator.h"
 
+#include <utility>
+
 namespace arex {
 
 Navigator::Navigator(const PlanningConfig& config, double force_lag_s, JobQueue& jobs,
@@ -52,21 +54,24 @@ void Navigator::hold(const MotionRequest& request, Stamp now) {
 void Navigator::start_guide(const Odometry& odometry,
                             const std::shared_ptr<const OccupancyMap2D>& map, Stamp now) {
   next_guide_ = now + from_seconds(1 / config_.guide_rate_hz);
-  jobs_.start(
-      guide_lane_, now, from_seconds(config_.guide_latency_s),
-      [this, map, from = odometry.X_OB.p, to = request_.goal_O, number = goal_number_, now,
-       latency = from_seconds(config_.guide_latency_s)]() -> JobQueue::Delivery {
-        const GuidePath path = plan_guide(*map, from.head<2>(), to.head<2>(), config_.guide);
-        return [this, guide = lift_path(path.points, from.z(), to.z()), number, now, latency] {
-          if (number != goal_number_) return;
-          if (has_target_) {
-            machine_.set_guide(guide);
-          } else {
-            machine_.set_target(request_.goal_O, guide, now + latency);
-            has_target_ = true;
-          }
-        };
-      });
+  jobs_.start(guide_lane_, now, from_seconds(config_.guide_latency_s),
+              [this, map, from = odometry.X_OB.p, to = request_.goal_O, number = goal_number_, now,
+               latency = from_seconds(config_.guide_latency_s)]() -> JobQueue::Delivery {
+                const GuidePath path =
+                    plan_guide(*map, from.head<2>(), to.head<2>(), config_.guide);
+                const bool follows = config_.guide.follow_ground && !map->ground.heights.empty();
+                auto lifted = follows ? lift_path(path.points, from.z(), to.z(), map->ground)
+                                      : lift_path(path.points, from.z(), to.z());
+                return [this, guide = std::move(lifted), number, now, latency] {
+                  if (number != goal_number_) return;
+                  if (has_target_) {
+                    machine_.set_guide(guide);
+                  } else {
+                    machine_.set_target(request_.goal_O, guide, now + latency);
+                    has_target_ = true;
+                  }
+                };
+              });
 }
 
 TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& grid,

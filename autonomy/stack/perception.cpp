@@ -14,6 +14,8 @@ constexpr Stamp kGlobalMapDue = kNanosecondsPerSecond / 5;
 constexpr Stamp kCloudDue = kNanosecondsPerSecond;
 // Frames whose grid is still being made.
 constexpr std::size_t kUnderWay = 2;
+/// Less than the height of a storey with its slab, more than what is flown over a floor.
+constexpr double kStorey_m = 3.5;
 
 }  // namespace
 
@@ -76,27 +78,46 @@ void Perception::add_scan(Stamp now, const RegisteredScan& scan) {
   jobs_.start(mapping_lane_, now, from_seconds(config_.latency_s),
               [this, scan, with_map_2d, jumps = jumps_]() -> JobQueue::Delivery {
                 return [this, rays = mapper_.integrate_locally(scan), grid = mapper_.snapshot(),
-                        with_map_2d, stamp = scan.stamp, jumps] {
+                        with_map_2d, stamp = scan.stamp, p_OB = scan.p_OB, jumps] {
                   if (jumps == jumps_) grid_ = grid;
-                  add_globally(rays, with_map_2d, stamp);
+                  add_globally(rays, with_map_2d, stamp, p_OB);
                 };
               });
 }
 
 void Perception::add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d,
-                              Stamp stamp) {
+                              Stamp stamp, const Vec3& p_OB) {
   jobs_.schedule(global_map_lane_, with_map_2d ? stamp : stamp + kGlobalMapDue,
-                 [this, rays, with_map_2d]() -> JobQueue::Delivery {
+                 [this, rays, with_map_2d, p_OB]() -> JobQueue::Delivery {
                    mapper_.integrate_globally(*rays);
                    if (!with_map_2d) return nullptr;
+                   mapper_.note_place(p_OB);
                    return [this, volume = mapper_.global().known_volume(),
                            map_2d = std::make_shared<OccupancyMap2D>(mapper_.occupancy_2d())] {
-                     map_2d->flown = trail_.cells();
-                     map_2d->flown_height_m = trail_.heights_m();
+                     add_flown(*map_2d);
                      map_2d_ = map_2d;
                      known_volume_m3_ = volume;
                    };
                  });
+}
+
+void Perception::add_flown(OccupancyMap2D& map) {
+  flown_in_map_ = trail_.cells().size();
+  map.flown.reserve(flown_in_map_);
+  map.flown_height_m.reserve(flown_in_map_);
+  const auto width = static_cast<std::uint32_t>(map.width);
+  for (std::size_t k = 0; k < flown_in_map_; ++k) {
+    const std::uint32_t cell = trail_.cells()[k];
+    const float height = trail_.heights_m()[k];
+    if (config_.global.band == BandReference::kFloor) {
+      const Vec2 p =
+          map.centre_of({static_cast<int>(cell % width), static_cast<int>(cell / width)});
+      const double above = height - map.ground.at(p);
+      if (above < 0 || above > kStorey_m) continue;  // over another storey's floor
+    }
+    map.flown.push_back(cell);
+    map.flown_height_m.push_back(height);
+  }
 }
 
 void Perception::add_scan(Stamp now, const LidarScan& scan) {

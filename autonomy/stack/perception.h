@@ -44,7 +44,7 @@ class Perception {
 
   /// Cells flown through since map_2d() was made. @pre there is one
   [[nodiscard]] std::vector<std::uint32_t> flown_since_map() const {
-    const auto known = static_cast<std::ptrdiff_t>(map_2d_->flown.size());
+    const auto known = static_cast<std::ptrdiff_t>(flown_in_map_);
     return {trail_.cells().begin() + known, trail_.cells().end()};
   }
 
@@ -60,7 +60,10 @@ class Perception {
   [[nodiscard]] JobQueue::Lane cloud_lane() const { return cloud_lane_; }
 
  private:
-  void add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d, Stamp stamp);
+  void add_globally(const std::shared_ptr<const RayCaster>& rays, bool with_map_2d, Stamp stamp,
+                    const Vec3& p_OB);
+  /// Gives the map the cells flown through, as far as they lie over the floor that it shows.
+  void add_flown(OccupancyMap2D& map);
 
   MappingConfig config_;
   VehicleConfig vehicle_;
@@ -80,6 +83,7 @@ class Perception {
   std::deque<RegisteredScan> scans_;  ///< the newest, which share their points
   std::optional<RegisteredDepth> depth_;
   std::shared_ptr<const OccupancyMap2D> map_2d_;
+  std::size_t flown_in_map_ = 0;  ///< cells of the trail that were there when map_2d_ was made
   double known_volume_m3_ = 0;
   bool refusal_told_ = false;  ///< in jobs of the cloud's lane
   bool cloud_cut_ = false;

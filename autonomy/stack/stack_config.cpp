@@ -114,6 +114,9 @@ StackConfig with_shared_values(StackConfig config) {
   GuideConfig& guide = config.planning.guide;
   guide.obstacle_distance_m = inflation + guide.margin_m;
   guide.comfort_distance_m = std::max(guide.comfort_distance_m, guide.obstacle_distance_m);
+  guide.follow_ground = config.exploration.explorer.follow_ground &&
+                        config.mapping.global.band == BandReference::kFloor;
+  config.planning.replan.follow_ground = guide.follow_ground;
 
   config.mapping.global.sensor = config.mapping.local.sensor;
 

@@ -231,8 +231,8 @@ struct StackConfig {
     f.check(mapping.enabled || !plans, "mapping.enabled true for missions that plan");
     f.check(!odometries.contains("truth") && !odometries.contains("estimate"),
             "odometries with other names than truth and estimate, which files of a run have");
-    f.check(!exploration.explorer.follow_ground || mapping.global.band == BandReference::kGround,
-            "exploration.follow_ground only with mapping.global.band: ground");
+    f.check(!exploration.explorer.follow_ground || mapping.global.band != BandReference::kAbsolute,
+            "exploration.follow_ground only with mapping.global.band: floor or ground");
   }
 
   /// Whether a source of this type flies or runs beside.

@@ -15,6 +15,7 @@
 #include "physics/airframe.h"
 #include "physics/physics_config.h"
 #include "run/device_section.h"
+#include "run/interfaces.h"
 #include "run/operator_link.h"
 #include "scoring/coverage.h"
 #include "scoring/map_error.h"
@@ -85,6 +86,7 @@ struct ScenarioConfig {
   std::map<std::string, DeviceSection> devices;
   std::vector<FaultConfig> faults;
   AutopilotConfig autopilot;
+  InterfaceConfig interfaces;
   StackConfig stack;
   std::vector<OperatorOrder> commands;
   OperatorLinkConfig operator_link;
@@ -109,6 +111,7 @@ struct ScenarioConfig {
       "kind: silent|stuck|delayed|noisy|dropping|false_returns|jumping|blinded|weak|stop, and the "
       "amounts of README's table");
     f("autopilot", autopilot, "flight controller");
+    f("interfaces", interfaces, "what the flight controller is connected by");
     stack.fields(f);
     f("commands", commands,
       "what the operator does: [{at_s: 120, do: hold}, {on: stop, do: land}, ...]; on: "

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "run/companion_link.h"
 #include "run/device_types.h"
 #include "run/drive_faults.h"
 #include "run/perfect_tracking.h"
@@ -82,6 +83,7 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       physics_(config_.physics, world_, start_pose(world_), config_.seed),
       frame_(config_.physics.frame, physics_.airframe(), config_.seed),
       autopilot_(config_.autopilot, config_.stack.vehicle),
+      wires_(config_.interfaces.dshot, config_.seed),
       previous_truth_(physics_.truth()),
       scorer_(scene_, physics_.airframe(), physics_.truth().X_WB,
               ThinBranchMeter(config_.scoring.thin, world_, stopping_of(config_.stack))),
@@ -91,6 +93,11 @@ Simulation::Simulation(const Scenario& scenario, int threads)
       drive_faulty_(concern_drive(config_.faults)) {
   add_devices();
   stack_ = std::make_unique<Stack>(config_.stack, jobs_, config_.seed);
+  if (CompanionLink::is_needed(config_.interfaces)) {
+    stack_ =
+        std::make_unique<CompanionLink>(config_.interfaces, config_.autopilot.motor,
+                                        config_.stack.vehicle, std::move(stack_), config_.seed);
+  }
   outlets_.software = stack_.get();
   if (config_.stack.mission.kind != MissionConfig::Kind::kExplore) return;
   coverage_ =
@@ -171,7 +178,7 @@ void Simulation::run_stack() {
 
 void Simulation::run_autopilot() {
   const StageTimer::Scope timed(timers_.autopilot);
-  motors_ = autopilot_.tick(now_);
+  motors_ = wires_.carry(autopilot_.tick(now_));
   hash_.add(motors_.throttle);
 }
 

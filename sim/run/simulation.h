@@ -12,6 +12,7 @@
 #include "math/fingerprint.h"
 #include "physics/flexible_frame.h"
 #include "physics/physics.h"
+#include "run/dshot.h"
 #include "run/fault_log.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
@@ -137,6 +138,7 @@ class Simulation {
   Physics physics_;
   FlexibleFrame frame_;
   Autopilot autopilot_;
+  DshotWires wires_;
   Recorder* recorder_ = nullptr;
 
   Stamp now_ = 0;

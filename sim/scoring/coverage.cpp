@@ -5,6 +5,12 @@
 #include <cstdio>
 
 namespace arex::sim {
+namespace {
+
+/// The middle of a storey's free space is nearer than this to its floor, and further from others'.
+constexpr double kStorey_m = 3.5;
+
+}  // namespace
 
 using worlds::Bounds;
 using worlds::World;
@@ -124,22 +130,31 @@ void CoverageScorer::place_area(const OccupancyMap2D& map, const Pose& X_WO) {
   placed_map_.height = map.height;
   placed_X_WO_ = X_WO;
   place_in_map_.resize(area_cells_W_.size());
+  height_in_map_.resize(area_cells_W_.size());
   const Pose X_OW = X_WO.inverse();
   for (std::size_t i = 0; i < area_cells_W_.size(); ++i) {
     const Vec3 p_O = X_OW * area_cells_W_[i].cast<double>();
     const Eigen::Vector2i cell = map.cell_of(p_O.head<2>());
     place_in_map_[i] = map.contains(cell) ? static_cast<std::int32_t>(map.index(cell)) : -1;
+    height_in_map_[i] = static_cast<float>(p_O.z());
   }
 }
 
 void CoverageScorer::count_area(const OccupancyMap2D& map, const Pose& X_WO) {
   place_area(map, X_WO);
+  const bool storeys = !map.ground.rises.empty();  // it chooses between them
   known_count_ = 0;
   for (std::size_t i = 0; i < known_.size(); ++i) {
     const std::int32_t place = place_in_map_[i];
-    known_[i] =
+    bool known =
         place >= 0 && map.cells[static_cast<std::size_t>(place)] != OccupancyMap2D::kUnknown;
-    known_count_ += known_[i];
+    if (known && storeys) {
+      const auto index = static_cast<int>(place);
+      const Vec2 p = map.centre_of({index % map.width, index / map.width});
+      known = !(std::abs(height_in_map_[i] - map.ground.at(p)) > kStorey_m);
+    }
+    known_[i] = known;
+    known_count_ += known;
   }
 }
 

@@ -114,6 +114,7 @@ class CoverageScorer {
   void collect_surface(const worlds::World& world, const Scene& scene, const ReachableSpace& space,
                        const Pose& X_WO, const ScoredRegion& region);
   void index_samples();
+  /// A cell is known if the map shows it, and not another storey's floor above or below it.
   void count_area(const OccupancyMap2D& map, const Pose& X_WO);
   void place_area(const OccupancyMap2D& map, const Pose& X_WO);
   void mark_near(const Vec3f& p_W);
@@ -126,8 +127,10 @@ class CoverageScorer {
   std::vector<Vec3f> area_cells_W_;
   std::vector<std::uint8_t> known_;
   std::size_t known_count_ = 0;
-  // Where the area's cells lie in the map, as long as the map's frame stays: index or -1.
+  // Where the area's cells lie in the map, as long as the map's frame stays: index or -1; and how
+  // high, m in O.
   std::vector<std::int32_t> place_in_map_;
+  std::vector<float> height_in_map_;
   OccupancyMap2D placed_map_;  ///< its geometry only
   Pose placed_X_WO_;
 

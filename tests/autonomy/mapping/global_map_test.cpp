@@ -326,6 +326,46 @@ TEST(GlobalMap, FollowsATiltedFloorUnderACeiling) {
   EXPECT_TRUE(std::isnan(out.ground.at({-23.5, 0})));
 }
 
+/// A yard at 0, a ramp of 30 degrees from x = -4 down to a floor at -2.9, and a roof over all of
+/// it.
+double ramp_height(double x) { return 0.05 - std::clamp((x + 4) * std::tan(M_PI / 6), 0.0, 2.9); }
+
+TEST(GlobalMap, StandsItsHeightBandOnARampColumnByColumn) {
+  GlobalMapConfig config = scene_config();
+  config.low_m.z() = -4;
+  config.band = BandReference::kFloor;
+  config.ground_max_slope = 0.7;
+  GlobalMap map(config, kResolution);
+  Painter painter(map);
+  for (double x = -7.95; x < 8; x += 0.1) {
+    for (double y = -7.95; y < 8; y += 0.1) {
+      painter.free_between({x, y, ramp_height(x) + 2.9}, {x, y, ramp_height(x)});
+      painter.occupied({x, y, ramp_height(x)});
+      painter.occupied({x, y, ramp_height(x) + 2.9});
+    }
+  }
+  for (double z = 0.1; z < 1; z += 0.1) painter.occupied({-1.05, 2.05, ramp_height(-1.05) + z});
+  painter.occupied({-2.05, 3.05, ramp_height(-2.05) + 0.2});  // a kerb
+  painter.show();
+  EXPECT_EQ(map.occupancy_2d().at({10, 10}), OccupancyMap2D::kUnknown);  // nobody has stood there
+  map.note_place({-7, 0, 1.5});
+  const OccupancyMap2D& out = map.occupancy_2d();
+  int free = 0, occupied = 0;
+  for (const std::int8_t c : out.cells) {
+    free += c == OccupancyMap2D::kFree;
+    occupied += c == OccupancyMap2D::kOccupied;
+  }
+  EXPECT_EQ(occupied, 1);
+  EXPECT_EQ(out.at(out.cell_of({-1.05, 2.05})), OccupancyMap2D::kOccupied);
+  EXPECT_EQ(free, 160 * 160 - 1);
+  for (double x = -7.9; x < 8; x += 0.13) {
+    EXPECT_NEAR(out.ground.at({x, 1.01}), ramp_height(x) - 0.05, 0.16) << x;
+  }
+  const std::size_t on_ramp = out.index(out.cell_of({-1.05, -3.05}));
+  EXPECT_NEAR(out.floor.top[on_ramp] * kResolution, ramp_height(-1.05) - 0.05, 0.11);
+  EXPECT_NEAR(out.floor.overhead[on_ramp] * kResolution, ramp_height(-1.05) + 2.85, 0.11);
+}
+
 TEST(GlobalMap, RefreshesThe2DMapAsIfMadeAnew) {
   const GlobalMapConfig config = room_config();
   RayCaster rays(kResolution);

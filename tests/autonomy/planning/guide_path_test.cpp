@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "math/random.h"
@@ -141,6 +142,38 @@ TEST(PointAhead, WalksOnFromTheNearestPoint) {
   EXPECT_NEAR(ahead.x(), 4.0, 1e-9);
   EXPECT_NEAR(ahead.y(), 1.0, 0.1);
   EXPECT_EQ(point_ahead(path, {3.9, 5.0, 1.9}, 30.0), path.back());
+}
+
+TEST(LiftPath, KeepsItsHeightAboveARamp) {
+  GroundHeights ground;
+  ground.origin = {0, -0.8};
+  ground.width = 10;
+  const double slope = -std::tan(M_PI / 6);
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < 10; ++x) {  // level up to 2.4 m, unseen from 7.2 m on
+      const bool ramp = x >= 3;
+      const double middle = ramp ? slope * (0.8 * x + 0.4 - 2.4) : 0.0;
+      ground.heights.push_back(x < 9 ? static_cast<float>(middle) : std::nanf(""));
+      ground.rises.emplace_back(ramp ? static_cast<float>(slope) : 0.F, 0.F);
+    }
+  }
+  const std::vector<Vec2> flat{{0.1, 0}, {6.3, 0}, {7.1, 0.4}, {7.9, 0.4}};
+  const std::vector<Vec3> path = lift_path(flat, 1.5, slope * (7.1 - 2.4) + 2.5, ground);
+  double walked = 0;
+  double length = 0;
+  for (std::size_t i = 1; i < flat.size(); ++i) length += (flat[i] - flat[i - 1]).norm();
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (i > 0) {
+      const double step = (path[i] - path[i - 1]).head<2>().norm();
+      EXPECT_LE(step, 0.5 + 1e-9);
+      walked += step;
+    }
+    if (path[i].x() > 7.2) continue;
+    const double floor = std::min(0.0, slope * (path[i].x() - 2.4));
+    EXPECT_NEAR(path[i].z() - floor, 1.5 + walked / length, 0.03) << path[i].transpose();
+  }
+  EXPECT_EQ(path.back().head<2>(), flat.back());
+  EXPECT_TRUE(std::isfinite(path.back().z()));
 }
 
 // A goal in a wall is as near from either side: the guide stays on the vehicle's, whichever face

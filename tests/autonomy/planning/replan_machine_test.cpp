@@ -396,6 +396,39 @@ TEST(ReplanMachine, FollowsAGuideAroundWhatTheGridDoesNotShow) {
   EXPECT_LT(nearest_corner, 4.0);
 }
 
+/// How far from its guide's height a vehicle comes that flies down a ramp of 30 degrees, which
+/// leaves its flat grid after two metres; m.
+double height_error_on_a_ramp(bool follow_ground) {
+  ReplanConfig config;
+  config.follow_ground = follow_ground;
+  ReplanMachine machine(config, LocalPlannerConfig(), YawConfig(), 1);
+  const double slope = std::tan(M_PI / 6);
+  const auto way = [&](double x) { return Vec3(x, 0, 1.5 - slope * std::clamp(x, 0.0, 12.0)); };
+  std::vector<Vec3> guide;
+  for (double x = -2; x <= 15; x += 0.5) guide.push_back(way(x));
+  Flight flight(machine, guide.front());
+  const auto around = [](const Vec3& p) {  // 3 m high, as the vehicle's own is
+    const Vec3 low = ((p - Vec3(8, 8, 1.5)) / 0.1).array().round() * 0.1;
+    return test::TestGrid(160, 160, 30, 0.1, low);
+  };
+  flight.step(around(guide.front()).view());
+  machine.set_target(guide.back(), guide, flight.now_);
+  double off = 0;
+  for (int i = 0; i < 4000 && machine.has_target() && !machine.needs_target(); ++i) {
+    const Vec3 p = flight.odometry_.X_OB.p;
+    flight.step(around(p).view());
+    off = std::max(off, std::abs(flight.last_.p_OB.z() - way(flight.last_.p_OB.x()).z()));
+  }
+  EXPECT_EQ(flight.count(PlannerEventKind::kTargetReached), 1);
+  return off;
+}
+
+TEST(ReplanMachine, FollowsAGuideDownARampAsFarAsTheGridShowsIt) {
+  // At 1.5 m above a ramp the inflation begins 0.7 m below.
+  EXPECT_LT(height_error_on_a_ramp(true), 0.7);
+  EXPECT_GT(height_error_on_a_ramp(false), 1.0);
+}
+
 TEST(ReplanMachine, AsPrintedItFliesStraightAndTurnsTowardsTheTargetAtOnce) {
   const test::TestGrid grid(300, 300, 30, 0.1, {-15, -15, 0});
   YawConfig yaw;

@@ -113,6 +113,27 @@ TEST(CoverageScorer, NothingMappedIsZeroAndEverythingIsOne) {
             "0.000,0.000,0.00000,0.00000,0.000\n1.000,2.000,1.00000,1.00000,7.000\n");
 }
 
+// A map of several storeys shows one in each column: what it knows of another counts for nothing.
+TEST(CoverageScorer, KnowsNothingOfAStoreyWhoseRoofTheMapShows) {
+  const World world = two_rooms();
+  const Scene scene(world);
+  CoverageScorer scorer = room_scorer(world, scene);
+  OccupancyMap2D map = free_map(-10, 10);
+  map.ground.origin = {-10, -10};
+  map.ground.tile_m = 1;
+  map.ground.width = 20;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 20; ++x) map.ground.heights.push_back(x < 10 ? -1.0F : 7.5F);
+  }
+  map.ground.rises.assign(400, Eigen::Vector2f::Zero());
+  scorer.update(0, 0, map, 0, {}, kStart);
+  // Of 5.2 m, from W x = 0.4 on, the map ends at O's x = 0, W x = 3.05.
+  EXPECT_NEAR(scorer.latest().area_fraction, (3.05 - 0.4) / 5.2, 0.02);
+  map.ground.rises.clear();  // of one storey
+  scorer.update(1, 0, map, 0, {}, kStart);
+  EXPECT_EQ(scorer.latest().area_fraction, 1);
+}
+
 // In O turned by a quarter and moved, the map ends at the room's middle, W x = 3.
 TEST(CoverageScorer, HalfARoomIsAHalfInAnyFrame) {
   const World world = two_rooms();

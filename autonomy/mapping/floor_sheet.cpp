@@ -1,0 +1,497 @@
+#include "mapping/floor_sheet.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <deque>
+#include <span>
+#include <utility>
+
+#include "mapping/bits.h"
+
+namespace arex {
+namespace {
+
+constexpr std::array<int, 8> kDx{1, 0, -1, 0, 1, -1, -1, 1}, kDy{0, 1, 0, -1, 1, 1, -1, -1};
+/// Cost of a step between tiles: 7/5 is the square root of 2 to 1 %.
+constexpr std::size_t kStraight = 5, kDiagonal = 7;
+/// O's origin is the standing vehicle's body, a leg above the ground.
+constexpr int kStandLayers = 3;
+/// Between the plane that a tile is expected to have and its floor: half a layer of noise, and what
+/// a crest or a foot of a ramp bends within a tile.
+constexpr int kTolerance = 1;
+/// A plane that went on over the unseen may be further off by a layer each so many tiles, up to so
+/// many layers: O's tilt, half a degree, is one in ten metres.
+constexpr int kGuessedPerLayer = 4, kMostGuessedLayers = 2;
+/// Planes that differ by less at a tile's corners say the same: the 2D map is not made anew.
+constexpr double kSame = 1.0;
+/// Neighbours whose floors are further apart than this do not meet; half a band, that what is free
+/// over one is free over the other.
+constexpr double kBrink = 10;
+/// Along the way the floor of neighbours is the same storey within what the steepest ramp rises.
+constexpr double kStorey = 14;
+/// Floor that is higher than the vehicle's by more is another storey's, or on the way there: more
+/// than what a vehicle passes on a ramp while it looks down, less than a storey.
+constexpr double kOwnStorey = 20;
+/// A floor that sinks by so much from one tile to the next dives: a ramp of 20 degrees. Of one that
+/// goes down the far end is not seen from its top, for rays that graze do not come back: it goes on
+/// for so many tiles. What lies so much higher is not its own.
+constexpr double kDive = 3;
+constexpr int kMostDived = 10;
+constexpr double kUnder = 25;
+/// Tiles that a floor goes on under another: enough unknown area to be worth a flight.
+constexpr int kMostUnder = 3;
+constexpr double kLevel = 0.2;  ///< layers per column: floors of less slope are level
+/// Layers of the vehicle above the floor that it flies over.
+constexpr double kLeastAbove = 3, kMostAbove = 35;
+constexpr int kLeastForSlope = 12;          ///< columns
+constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
+constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
+constexpr double kOutlier_layers = 1.5;
+/// Feet further than this from all that is expected of a tile are none of its floor: it rises by a
+/// layer a column at most, from somewhere within the tolerance.
+constexpr int kReach = kBrickCells + kTolerance + kMostGuessedLayers;
+constexpr std::size_t kMostLayers = 2 * kReach + 2 * kBrickCells;
+
+/// Masks of the columns whose x (in bits 0, 2, 4 of the index) is 0 mod 2, 1 mod 4, and 3.
+constexpr std::uint64_t columns_where(int modulus, int rest, int bit) {
+  std::uint64_t out = 0;
+  for (int i = 0; i < 64; ++i) {
+    const int c = (i >> bit & 1) | (i >> (bit + 2) & 1) << 1 | (i >> (bit + 4) & 1) << 2;
+    if (c % modulus == rest) out |= std::uint64_t{1} << i;
+  }
+  return out;
+}
+
+/// The columns one further on along an axis (bit 0: x, bit 1: y); from 7 on they are lost. In
+/// Morton order a step from an even column is 1 bit, from 1 or 5 it is 3, from 3 it is 11.
+template <int kAxis>
+std::uint64_t shift_up(std::uint64_t columns) {
+  constexpr std::uint64_t even = columns_where(2, 0, kAxis), one = columns_where(4, 1, kAxis);
+  constexpr std::uint64_t three = columns_where(8, 3, kAxis);
+  return (columns & even) << (1 << kAxis) | (columns & one) << (3 << kAxis) |
+         (columns & three) << (11 << kAxis);
+}
+template <int kAxis>
+std::uint64_t shift_down(std::uint64_t columns) {
+  constexpr std::uint64_t odd = columns_where(2, 1, kAxis), two = columns_where(4, 2, kAxis);
+  constexpr std::uint64_t four = columns_where(8, 4, kAxis);
+  return (columns & odd) >> (1 << kAxis) | (columns & two) >> (3 << kAxis) |
+         (columns & four) >> (11 << kAxis);
+}
+
+/// The columns and their eight neighbours.
+std::uint64_t with_neighbours(std::uint64_t columns) {
+  columns |= shift_up<0>(columns) | shift_down<0>(columns);
+  return columns | shift_up<1>(columns) | shift_down<1>(columns);
+}
+
+int x_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x15)); }
+int y_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x2a)); }
+
+/// A column of a floor: its place in the tile, and the layer in which it lies there.
+struct Sample {
+  double x = 0, y = 0, layer = 0;
+};
+struct Samples {
+  std::array<Sample, 64> of;
+  int count = 0;
+
+  [[nodiscard]] std::span<const Sample> all() const {
+    return std::span(of).first(static_cast<std::size_t>(count));
+  }
+  void drop(const auto& is_off) {
+    const auto end = std::remove_if(of.begin(), of.begin() + count, is_off);
+    count = static_cast<int>(end - of.begin());
+  }
+};
+
+/// From the columns that are floor to their neighbours, by a layer at most, until there are no
+/// more.
+void go_on_column_by_column(std::span<const FloorSheet::Feet> feet,
+                            std::array<std::uint64_t, kMostLayers>& floor) {
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (std::size_t k = 0; k < feet.size(); ++k) {
+      std::uint64_t near = floor[k];
+      if (k > 0 && feet[k - 1].layer == feet[k].layer - 1) near |= floor[k - 1];
+      if (k + 1 < feet.size() && feet[k + 1].layer == feet[k].layer + 1) near |= floor[k + 1];
+      if (near == 0) continue;
+      const std::uint64_t more = with_neighbours(near) & feet[k].columns & ~floor[k];
+      grows |= more != 0;
+      floor[k] |= more;
+    }
+  }
+}
+
+/// Of each column the lowest.
+Samples samples_of(std::span<const FloorSheet::Feet> feet,
+                   const std::array<std::uint64_t, kMostLayers>& floor) {
+  Samples samples;
+  std::uint64_t taken = 0;
+  for (std::size_t k = 0; k < feet.size(); ++k) {
+    for (std::uint64_t bits = floor[k] & ~taken; bits != 0; bits &= bits - 1) {
+      const int i = std::countr_zero(bits);
+      samples.of[static_cast<std::size_t>(samples.count++)] = {static_cast<double>(x_of(i)),
+                                                               static_cast<double>(y_of(i)),
+                                                               static_cast<double>(feet[k].layer)};
+    }
+    taken |= floor[k];
+  }
+  return samples;
+}
+
+/// Least squares; along axes on which the samples say nothing, with the rise expected there.
+TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
+  const auto n = static_cast<double>(samples.count);
+  Sample mean;
+  for (const Sample& s : samples.all()) {
+    mean.x += s.x / n;
+    mean.y += s.y / n;
+    mean.layer += s.layer / n;
+  }
+  double xx = 0, yy = 0, xy = 0, xz = 0, yz = 0;
+  for (const Sample& s : samples.all()) {
+    const double x = s.x - mean.x, y = s.y - mean.y, z = s.layer - mean.layer;
+    xx += x * x / n;
+    yy += y * y / n;
+    xy += x * y / n;
+    xz += x * z / n;
+    yz += y * z / n;
+  }
+  TilePlane plane;
+  plane.rise = expected_rise;
+  const double determinant = xx * yy - xy * xy;
+  const bool tells = samples.count >= kLeastForSlope && std::min(xx, yy) >= kLeastSpread &&
+                     determinant >= kLeastIndependence * xx * yy;
+  if (tells) plane.rise = Vec2(yy * xz - xy * yz, xx * yz - xy * xz) / determinant;
+  plane.height = mean.layer + plane.rise.x() * (TilePlane::kMiddle - mean.x) +
+                 plane.rise.y() * (TilePlane::kMiddle - mean.y);
+  return plane;
+}
+
+TilePlane shifted(const TilePlane& plane, const Eigen::Vector2i& step) {
+  TilePlane there = plane;
+  there.height += kBrickCells * (plane.rise.x() * step.x() + plane.rise.y() * step.y());
+  return there;
+}
+
+bool say_the_same(const TilePlane& a, const TilePlane& b) {
+  constexpr double kEnd = kBrickCells - 1;
+  for (const double x : {0.0, kEnd}) {
+    for (const double y : {0.0, kEnd}) {
+      if (std::abs(a.at(x, y) - b.at(x, y)) >= kSame) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+ColumnLayers::ColumnLayers(const TilePlane& plane) {
+  std::array<int, 64> layers{};
+  for (int i = 0; i < 64; ++i) {
+    layers[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(plane.at(x_of(i), y_of(i))));
+  }
+  low_ = *std::min_element(layers.begin(), layers.end());
+  count_ = *std::max_element(layers.begin(), layers.end()) - low_ + 1;
+  for (std::size_t i = 0; i < 64; ++i) {
+    columns_[static_cast<std::size_t>(layers[i] - low_)] |= std::uint64_t{1} << i;
+  }
+}
+
+FloorSheet::FloorSheet(int width, int height, double tile_m, double max_slope, int support)
+    : width_(width),
+      height_(height),
+      max_slope_(std::min(max_slope, ColumnLayers::kSteepest)),
+      support_(support),
+      corridor_(static_cast<std::size_t>(std::lround(kStraight * kCorridor_m / tile_m))),
+      tiles_(static_cast<std::size_t>(width * height)) {}
+
+void FloorSheet::set_feet(std::size_t tile, std::vector<Feet> feet) {
+  tiles_[tile].feet = std::move(feet);
+  changed_ = true;
+}
+
+void FloorSheet::note_place(const Eigen::Vector2i& tile, int layer) {
+  if (!contains(tile)) return;
+  if (way_.empty()) {
+    way_.push_back({tile, layer});
+    changed_ = true;
+    return;
+  }
+  while (way_.back().tile != tile) {
+    const Eigen::Vector2i left = tile - way_.back().tile;
+    step_to(way_.back().tile + left.cwiseSign(), layer);
+    changed_ = true;
+  }
+}
+
+/// A loop is cut where the way comes beside itself on the same storey.
+void FloorSheet::step_to(const Eigen::Vector2i& tile, int layer) {
+  const double here = tiles_[index(way_.back().tile)].shown.plane.height;
+  const auto again = std::find_if(way_.begin(), way_.end() - 1, [&](const Place& p) {
+    return (p.tile - tile).cwiseAbs().maxCoeff() <= 1 &&
+           std::abs(tiles_[index(p.tile)].shown.plane.height - here) <= kStorey;
+  });
+  if (again != way_.end() - 1) way_.erase(again + 1, way_.end());
+  if (way_.back().tile != tile) way_.push_back({tile, layer});
+}
+
+std::optional<TilePlane> FloorSheet::plane(std::size_t tile) const {
+  const Label& label = tiles_[tile].shown;
+  if (!label.known) return std::nullopt;
+  return label.plane;
+}
+
+std::vector<std::size_t> FloorSheet::spread() {
+  if (!std::exchange(changed_, false) || way_.empty()) return {};
+  for (Tile& tile : tiles_) {
+    tile.label = {};
+    tile.pinned = tile.done = false;
+  }
+  follow_way();
+  pin_corridor();
+  join_seen();
+  go_under();
+  fill_unseen();
+  std::vector<std::size_t> changed;
+  std::vector<std::uint64_t> brinks(tiles_.size(), 0);
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    Tile& tile = tiles_[t];
+    const bool same =
+        tile.label.known == tile.shown.known && say_the_same(tile.label.plane, tile.shown.plane);
+    tile.shown.seen = tile.label.seen;
+    if (same) continue;
+    tile.shown = tile.label;
+    changed.push_back(t);
+  }
+  find_brinks(brinks);
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (brinks[t] == tiles_[t].brinks) continue;
+    tiles_[t].brinks = brinks[t];
+    changed.push_back(t);
+  }
+  return changed;
+}
+
+void FloorSheet::follow_way() {
+  Label label;
+  label.known = true;
+  label.plane.height = -0.5 * kStandLayers;
+  label.guessed = kMostGuessedLayers * kGuessedPerLayer;  // the leg's length is not known here
+  for (std::size_t k = 0; k < way_.size(); ++k) {
+    const Place& place = way_[k];
+    const std::size_t t = index(place.tile);
+    label = go_on(label, place.tile - way_[k == 0 ? 0 : k - 1].tile, t);
+    // Over an edge it comes to fly over another floor, which was known before from elsewhere.
+    const Label& before = tiles_[t].shown;
+    const double above = place.layer - before.plane.height;
+    const bool follows = label.seen && label.plane.height <= place.layer - kLeastAbove;
+    if (!follows && before.known && before.seen && above >= kLeastAbove && above <= kMostAbove) {
+      label = before;
+    }
+    tiles_[t].label = label;
+    tiles_[t].pinned = true;
+  }
+}
+
+void FloorSheet::pin_corridor() {
+  std::vector<std::vector<std::size_t>> open(corridor_ + kDiagonal + 1);
+  for (auto place = way_.rbegin(); place != way_.rend(); ++place) {
+    open[0].push_back(index(place->tile));
+  }
+  for (std::size_t cost = 0; cost <= corridor_; ++cost) {
+    for (std::size_t k = 0; k < open[cost].size(); ++k) {
+      const std::size_t t = open[cost][k];
+      if (std::exchange(tiles_[t].done, true)) continue;
+      for (std::size_t s = 0; s < kDx.size(); ++s) {
+        const Eigen::Vector2i step(kDx[s], kDy[s]);
+        if (!contains(tile_of(t) + step)) continue;
+        const std::size_t there = index(tile_of(t) + step);
+        const std::size_t reached = cost + (s < 4 ? kStraight : kDiagonal);
+        if (tiles_[there].pinned || reached > corridor_) continue;
+        const Label label = go_on(tiles_[t].label, step, there);
+        if (!label.seen) continue;
+        tiles_[there].label = label;
+        tiles_[there].pinned = true;
+        open[reached].push_back(there);
+      }
+    }
+  }
+  for (Tile& tile : tiles_) tile.done = false;
+}
+
+/// Not from what lies a storey above the vehicle: it was left, or is still to be climbed to, and
+/// may lie over what is to be explored down here.
+bool FloorSheet::leads_on(std::size_t t) const {
+  const double here = tiles_[index(way_.back().tile)].label.plane.height;
+  return tiles_[t].label.plane.height <= here + kOwnStorey;
+}
+
+/// From the corridor over all that goes on with it. Where floors lie above each other a tile has
+/// the lowest that is joined; one that dives under another goes on under it, unseen.
+void FloorSheet::join_seen() {
+  std::deque<std::size_t> open;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (tiles_[t].pinned) open.push_back(t);
+  }
+  for (; !open.empty(); open.pop_front()) {
+    const std::size_t t = open.front();
+    if (!leads_on(t)) continue;
+    for (std::size_t s = 0; s < kDx.size(); ++s) {
+      const Eigen::Vector2i step(kDx[s], kDy[s]);
+      if (!contains(tile_of(t) + step)) continue;
+      const std::size_t there = index(tile_of(t) + step);
+      const Label& before = tiles_[there].label;
+      const TilePlane expected = shifted(tiles_[t].label.plane, step);
+      if (tiles_[there].pinned) continue;
+      if (before.seen && expected.height > before.plane.height - kBrink) continue;
+      Label label = go_on(tiles_[t].label, step, there);
+      if (!label.seen) {
+        const bool dives = s < 4 && label.guessed <= kMostDived &&
+                           expected.height <= tiles_[t].label.plane.height - kDive;
+        if (!dives) continue;
+        label.plane = expected;
+      }
+      const double above = label.plane.height - before.plane.height;
+      const bool better = label.seen ? above <= (before.seen ? -kBrink : kUnder)
+                                     : above <= (before.seen ? -kUnder : -kBrink);
+      if (before.known && !better) continue;
+      tiles_[there].label = label;
+      open.push_back(there);
+    }
+  }
+}
+
+/// A floor that comes to lie under another's goes on under it, unseen, for a few tiles: there is
+/// something to explore.
+void FloorSheet::go_under() {
+  for (int ring = 0; ring < kMostUnder; ++ring) {
+    std::vector<std::pair<std::size_t, Label>> under;
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      if (!tiles_[t].label.known || !leads_on(t)) continue;
+      for (std::size_t s = 0; s < 4; ++s) {
+        const Eigen::Vector2i step(kDx[s], kDy[s]);
+        if (!contains(tile_of(t) + step)) continue;
+        const std::size_t there = index(tile_of(t) + step);
+        const double expected = shifted(tiles_[t].label.plane, step).height;
+        const Tile& over = tiles_[there];
+        const bool roof = over.label.seen && over.label.plane.rise.norm() < kLevel;  // no ramp
+        if (over.pinned || !roof || over.label.plane.height - expected <= kUnder) continue;
+        under.emplace_back(there, go_on(tiles_[t].label, step, there));
+      }
+    }
+    for (const auto& [tile, label] : under) tiles_[tile].label = label;
+  }
+}
+
+/// The others, from their nearest neighbours on.
+void FloorSheet::fill_unseen() {
+  std::vector<std::vector<std::size_t>> open(kDiagonal + 1);  // a ring
+  std::size_t waiting = 0;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (!tiles_[t].label.known || !leads_on(t)) continue;
+    open[0].push_back(t);
+    ++waiting;
+  }
+  for (std::size_t cost = 0; waiting > 0; ++cost) {
+    std::vector<std::size_t>& bucket = open[cost % open.size()];
+    for (std::size_t k = 0; k < bucket.size(); ++k) {
+      const std::size_t t = bucket[k];
+      --waiting;
+      if (std::exchange(tiles_[t].done, true)) continue;
+      if (!tiles_[t].label.known) settle(t);
+      for (std::size_t s = 0; s < kDx.size(); ++s) {
+        const Eigen::Vector2i there = tile_of(t) + Eigen::Vector2i(kDx[s], kDy[s]);
+        if (!contains(there) || tiles_[index(there)].label.known) continue;
+        open[(cost + (s < 4 ? kStraight : kDiagonal)) % open.size()].push_back(index(there));
+        ++waiting;
+      }
+    }
+    bucket.clear();
+  }
+}
+
+/// The floor that it has if that of any neighbour goes on into it; otherwise a neighbour's, gone
+/// on.
+void FloorSheet::settle(std::size_t t) {
+  const Eigen::Vector2i here = tile_of(t);
+  for (std::size_t s = 0; s < kDx.size() && !tiles_[t].label.seen; ++s) {
+    const Eigen::Vector2i step(kDx[s], kDy[s]);
+    if (!contains(here - step)) continue;
+    const std::size_t from = index(here - step);
+    if (!tiles_[from].done) continue;
+    const Label label = go_on(tiles_[from].label, step, t);
+    if (label.seen || !tiles_[t].label.known) tiles_[t].label = label;
+  }
+}
+
+FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& step,
+                                    std::size_t tile) const {
+  Label label;
+  label.known = true;
+  const TilePlane expected = shifted(from.plane, step);
+  const int most = kTolerance + std::min(from.guessed / kGuessedPerLayer, kMostGuessedLayers);
+  for (int tolerance = kTolerance; tolerance <= most; ++tolerance) {  // the nearest one first
+    if (const auto floor = find_floor(tiles_[tile].feet, expected, tolerance)) {
+      label.plane = *floor;
+      label.seen = true;
+      return label;
+    }
+  }
+  label.plane = expected;
+  label.plane.rise *= 0.5;
+  label.guessed = from.guessed + 1;
+  return label;
+}
+
+std::optional<TilePlane> FloorSheet::find_floor(const std::vector<Feet>& feet,
+                                                const TilePlane& expected, int tolerance) const {
+  const ColumnLayers layers(expected);
+  const int low = layers.lowest() - kReach, high = layers.highest() + kReach;
+  const auto from = [](const Feet& f, int layer) { return f.layer < layer; };
+  const auto begin = std::lower_bound(feet.begin(), feet.end(), low, from);
+  const std::span<const Feet> near(begin, std::lower_bound(begin, feet.end(), high, from));
+  std::array<std::uint64_t, kMostLayers> floor{};
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const int layer = near[k].layer;
+    floor[k] = near[k].columns & layers.between(layer - tolerance, layer + tolerance + 1);
+  }
+  go_on_column_by_column(near, floor);
+  Samples samples = samples_of(near, floor);
+  if (samples.count < support_) return std::nullopt;
+  // Twice: the second time without what stands on it or leans against it.
+  TilePlane plane = fit_plane(samples, expected.rise);
+  samples.drop(
+      [&](const Sample& s) { return std::abs(s.layer - plane.at(s.x, s.y)) > kOutlier_layers; });
+  if (samples.count < support_) return std::nullopt;
+  plane = fit_plane(samples, expected.rise);
+  if (plane.rise.norm() > max_slope_) return std::nullopt;
+  // A ramp shows its slope; what only lies near where it would go on is the foot of a wall.
+  const bool shown = samples.count >= kLeastForSlope || plane.rise.norm() < kLevel;
+  return shown ? std::optional(plane) : std::nullopt;
+}
+
+void FloorSheet::find_brinks(std::vector<std::uint64_t>& brinks) const {
+  constexpr double kEnd = kBrickCells - 1;
+  constexpr std::array<std::uint64_t, 4> kSide{columns_where(8, 7, 0), columns_where(8, 7, 1),
+                                               columns_where(8, 0, 0), columns_where(8, 0, 1)};
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const Label& here = tiles_[t].shown;
+    if (!here.known || !here.seen) continue;
+    for (std::size_t s = 0; s < kSide.size(); ++s) {
+      const Eigen::Vector2i step(kDx[s], kDy[s]);
+      if (!contains(tile_of(t) + step)) continue;
+      const Label& there = tiles_[index(tile_of(t) + step)].shown;
+      if (!there.known) continue;
+      const auto edge = [&](const TilePlane& plane, int side) {
+        const double half = 0.5 * kEnd * side;
+        return plane.height + half * (plane.rise.x() * step.x() + plane.rise.y() * step.y());
+      };
+      if (edge(here.plane, 1) - edge(there.plane, -1) > kBrink) brinks[t] |= kSide[s];
+    }
+  }
+}
+
+}  // namespace arex

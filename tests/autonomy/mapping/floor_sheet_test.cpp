@@ -1,0 +1,231 @@
+#include "mapping/floor_sheet.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <random>
+#include <vector>
+
+namespace arex {
+namespace {
+
+constexpr int kWidth = 30, kHeight = 20;
+constexpr double kTile_m = 0.8;
+
+int column_bit(int x, int y) {
+  int bit = 0;
+  for (int k = 0; k < 3; ++k) bit |= (x >> k & 1) << (2 * k) | (y >> k & 1) << (2 * k + 1);
+  return bit;
+}
+
+/// A world of columns: the layers in which surfaces or objects begin, seen from below.
+class Site {
+ public:
+  Site() : layers_(static_cast<std::size_t>(kWidth * kHeight * 64)) {}
+
+  std::vector<int>& at(int x, int y) {
+    return layers_[static_cast<std::size_t>(y * kWidth * 8 + x)];
+  }
+  /// A surface over a rectangle of columns, by the height at (x, y) in layers.
+  void add(int x0, int x1, int y0, int y1, const std::function<double(int, int)>& height) {
+    for (int y = y0; y < y1; ++y) {
+      for (int x = x0; x < x1; ++x) at(x, y).push_back(static_cast<int>(std::floor(height(x, y))));
+    }
+  }
+  void give_to(FloorSheet& sheet, int from_layer = -1000) {
+    for (int ty = 0; ty < kHeight; ++ty) {
+      for (int tx = 0; tx < kWidth; ++tx) {
+        std::map<int, std::uint64_t> feet;
+        for (int y = 0; y < 8; ++y) {
+          for (int x = 0; x < 8; ++x) {
+            for (const int layer : at(8 * tx + x, 8 * ty + y)) {
+              if (layer >= from_layer) feet[layer] |= std::uint64_t{1} << column_bit(x, y);
+            }
+          }
+        }
+        std::vector<FloorSheet::Feet> sorted;
+        for (const auto& [layer, columns] : feet) sorted.push_back({layer, columns});
+        sheet.set_feet(static_cast<std::size_t>(ty * kWidth + tx), std::move(sorted));
+      }
+    }
+  }
+
+ private:
+  std::vector<std::vector<int>> layers_;
+};
+
+FloorSheet make_sheet() { return FloorSheet(kWidth, kHeight, kTile_m, 0.7, 3); }
+
+std::size_t tile(int x, int y) { return static_cast<std::size_t>(y * kWidth + x); }
+
+double height(const FloorSheet& sheet, int x, int y) {
+  const auto plane = sheet.plane(tile(x, y));
+  return plane ? plane->height : std::nan("");
+}
+
+TEST(ColumnLayers, AsksEachColumnForItsOwnHeight) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> rise(-1, 1), level(-50, 50);
+  for (int trial = 0; trial < 50; ++trial) {
+    const TilePlane plane{level(random), {rise(random), rise(random)}};
+    const ColumnLayers layers(plane);
+    for (int low = layers.lowest() - 2; low < layers.highest() + 2; ++low) {
+      const std::uint64_t found = layers.between(low, low + 3);
+      for (int y = 0; y < 8; ++y) {
+        for (int x = 0; x < 8; ++x) {
+          const long layer = std::lround(plane.at(x, y));
+          EXPECT_EQ(found >> column_bit(x, y) & 1U, layer >= low && layer < low + 3 ? 1U : 0U);
+        }
+      }
+    }
+  }
+}
+
+TEST(FloorSheet, KnowsNothingBeforeTheVehicleStands) {
+  FloorSheet sheet = make_sheet();
+  EXPECT_TRUE(sheet.spread().empty());
+  EXPECT_FALSE(sheet.plane(0));
+}
+
+/// A hall of level -80 under a yard of level 0, and a ramp of 30 degrees down to it, 48 columns
+/// wide, between walls; noise of a layer.
+Site make_garage(unsigned seed) {
+  Site site;
+  std::mt19937_64 random(seed);
+  std::bernoulli_distribution lower(0.2);
+  const double slope = std::tan(M_PI / 6);
+  const double foot = 24 + 80 / slope;  // column
+  const auto noisy = [&](double h) { return h + 0.5 - (lower(random) ? 1 : 0); };
+  const auto yard = [&](int, int) { return noisy(0); };
+  const auto hall = [&](int, int) { return noisy(-80); };
+  const auto ramp = [&](int x, int) { return noisy(-slope * (x + 0.5 - 24)); };
+  site.add(0, 24, 0, 160, yard);
+  site.add(24, 240, 0, 56, yard);
+  site.add(24, 240, 104, 160, yard);
+  site.add(24, static_cast<int>(foot), 56, 104, ramp);
+  site.add(static_cast<int>(foot), 240, 0, 160, hall);
+  site.add(24, static_cast<int>(foot), 0, 52, hall);
+  site.add(24, static_cast<int>(foot), 108, 160, hall);
+  site.add(static_cast<int>(foot), 240, 56, 104, yard);  // over the hall
+  return site;
+}
+
+TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    site.give_to(sheet, -60);  // from above
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    EXPECT_NEAR(height(sheet, 1, 10), 0, 1);
+    EXPECT_NEAR(height(sheet, 1, 1), 0, 1);
+    EXPECT_NEAR(height(sheet, 10, 1), 0, 1);
+    EXPECT_NEAR(height(sheet, 15, 10), -slope * (8 * 15 + 4 - 24), 1.5);  // under the yard
+    EXPECT_LT(height(sheet, 17, 10), -60);  // goes on down, unseen, though the yard is seen there
+    EXPECT_FALSE(sheet.is_seen(tile(17, 10)));
+    site.give_to(sheet);
+    sheet.spread();
+    for (int x = 3; x < 20; ++x) {
+      const double expected = std::max(-80.0, -slope * (8 * x + 4 - 24));
+      EXPECT_NEAR(height(sheet, x, 10), expected, 1.5) << x;
+      EXPECT_TRUE(sheet.is_seen(tile(x, 10)));
+    }
+    EXPECT_NEAR(sheet.plane(tile(10, 10))->rise.x(), -slope, 0.08);
+    // Down, and off to the side: now the hall's floor, but the way home stays.
+    for (int x = 1; x < 24; ++x) {
+      sheet.note_place(
+          {x, 10}, static_cast<int>(15 - std::min(80.0, std::max(0.0, slope * (8 * x + 4 - 24)))));
+      sheet.spread();
+    }
+    for (int y = 10; y > 3; --y) {
+      sheet.note_place({24, y}, -65);
+      sheet.spread();
+    }
+    for (int x = 24; x > 8; --x) {
+      sheet.note_place({x, 4}, -65);
+      sheet.spread();
+    }
+    EXPECT_NEAR(height(sheet, 10, 1), -80, 1);
+    EXPECT_NEAR(height(sheet, 10, 4), -80, 1);
+    EXPECT_NEAR(height(sheet, 28, 10), -80, 1);
+    EXPECT_NEAR(height(sheet, 1, 10), 0, 1);
+    for (int x = 3; x < 17; ++x) {
+      EXPECT_NEAR(height(sheet, x, 10), std::max(-80.0, -slope * (8 * x + 4 - 24)), 1.5) << x;
+    }
+    EXPECT_NE(sheet.brinks(tile(1, 8)), 0U);  // the yard ends there
+    EXPECT_EQ(sheet.brinks(tile(10, 4)), 0U);
+  }
+}
+
+// From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
+TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
+  FloorSheet sheet = make_sheet();
+  Site site = make_garage(4);
+  site.give_to(sheet, -60);
+  for (int y = 10; y > 5; --y) sheet.note_place({1, y}, 13);
+  for (int x = 1; x < 7; ++x) sheet.note_place({x, 5}, 13);
+  sheet.spread();
+  const double ramp = height(sheet, 7, 9);
+  EXPECT_NEAR(ramp, -std::tan(M_PI / 6) * (8 * 7 + 4 - 24), 1.5);
+  for (int y = 6; y < 10; ++y) sheet.note_place({7, y}, y < 8 ? 13 : 8);
+  for (int x = 8; x < 11; ++x) {
+    sheet.note_place({x, 9}, static_cast<int>(15 - std::tan(M_PI / 6) * (8 * x + 4 - 24)));
+  }
+  sheet.spread();
+  EXPECT_NEAR(height(sheet, 7, 9), ramp, 1.5);
+  EXPECT_NEAR(height(sheet, 10, 9), -std::tan(M_PI / 6) * (8 * 10 + 4 - 24), 1.5);
+  EXPECT_NEAR(height(sheet, 14, 9), -std::tan(M_PI / 6) * (8 * 14 + 4 - 24), 1.5);
+}
+
+TEST(FloorSheet, ClimbsNoCarAndFindsTheFloorBehindIt) {
+  FloorSheet sheet = make_sheet();
+  Site site;
+  std::mt19937_64 random(5);
+  site.add(0, 240, 0, 160, [](int, int) { return 0; });
+  // 45 x 18 columns: bumper and sills 2 layers up, bonnet at 8, roof at 14; its floor not seen.
+  for (int y = 60; y < 78; ++y) {
+    for (int x = 60; x < 105; ++x) {
+      const bool rim = x == 60 || x == 104 || y == 60 || y == 77;
+      const bool roof = x > 75 && x < 95;
+      site.at(x, y) = {rim ? 2 : roof ? 14 : 8};
+    }
+  }
+  site.give_to(sheet);
+  for (int x = 0; x < 5; ++x) sheet.note_place({x, 8}, 13);
+  sheet.spread();
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) EXPECT_NEAR(height(sheet, x, y), 0, 0.7) << x << " " << y;
+  }
+}
+
+TEST(FloorSheet, GoesOnOverTheUnseenAndTakesUpTheFloorBeyond) {
+  FloorSheet sheet = make_sheet();
+  Site site;
+  const auto tilted = [](int x, int) { return 0.0096 * x; };  // O's tilt
+  site.add(0, 80, 0, 160, tilted);
+  site.add(144, 240, 0, 160, tilted);
+  site.give_to(sheet);
+  sheet.note_place({1, 10}, 13);
+  sheet.spread();
+  EXPECT_FALSE(sheet.is_seen(tile(13, 10)));
+  EXPECT_NEAR(height(sheet, 13, 10), 1, 1.5);
+  EXPECT_TRUE(sheet.is_seen(tile(20, 10)));
+  EXPECT_NEAR(height(sheet, 20, 10), 0.0096 * 164, 1);
+}
+
+TEST(FloorSheet, HandsOutAPlaneAnewOnlyWhenItSaysSomethingElse) {
+  FloorSheet sheet = make_sheet();
+  Site site = make_garage(7);
+  site.give_to(sheet);
+  sheet.note_place({0, 10}, 13);
+  EXPECT_GE(sheet.spread().size(), static_cast<std::size_t>(kWidth * kHeight));
+  EXPECT_TRUE(sheet.spread().empty());  // nothing was said
+  sheet.note_place({1, 10}, 13);
+  EXPECT_LT(sheet.spread().size(), 60U);
+}
+
+}  // namespace
+}  // namespace arex

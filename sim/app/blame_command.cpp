@@ -51,7 +51,8 @@ sim::FlightEnd end_of(const std::string& name, const std::string& text,
 ordered_json summary_of(const fs::path& run) {
   std::error_code none;
   if (!sim::is_run_folder(run)) {
-    throw ConfigError(run.string() + (fs::exists(run, none) ? ": holds no run" : ": does not exist") +
+    throw ConfigError(run.string() +
+                      (fs::exists(run, none) ? ": holds no run" : ": does not exist") +
                       ", expected a run folder");
   }
   const auto summary = sim::read_summary(run);
@@ -85,7 +86,8 @@ class Flights {
     auto next = experiments.begin();
     std::size_t done = 0;
     while (next != experiments.end() || !flying_.empty()) {
-      for (; next != experiments.end() && flying_.size() < static_cast<std::size_t>(jobs_); ++next) {
+      for (; next != experiments.end() && flying_.size() < static_cast<std::size_t>(jobs_);
+           ++next) {
         start(*next);
       }
       if (sim::SignalGate::wait(kLongestWait_s) != 0) return false;
@@ -113,12 +115,12 @@ class Flights {
     const std::string configuration = experiment.name + ".yaml";
     write_atomically(folder_ / configuration, experiment.resolved_yaml);
     const std::string threads = std::to_string(std::clamp(cores() / jobs_, 1, 4));
-    flying_.push_back({experiment.name,
-                       sim::ChildProcess(kSelf,
-                                         {"run", configuration, "--name", scenario_, "--out",
-                                          experiment.name, "--threads", threads, "--quiet",
-                                          "--no-report"},
-                                         folder_)});
+    flying_.push_back(
+        {experiment.name,
+         sim::ChildProcess(kSelf,
+                           {"run", configuration, "--name", scenario_, "--out", experiment.name,
+                            "--threads", threads, "--quiet", "--no-report"},
+                           folder_)});
   }
 
   void expect_summary(const Flight& flight, const sim::ChildExit& exit) const {
@@ -145,7 +147,8 @@ class Flights {
 void expect_own_folder(const fs::path& folder) {
   for (const char* name : {"resolved.yaml", "sweep.json"}) {
     if (!fs::exists(folder / name)) continue;
-    throw ConfigError(folder.string() + ": holds a run or a sweep, expected a folder for the blame");
+    throw ConfigError(folder.string() +
+                      ": holds a run or a sweep, expected a folder for the blame");
   }
   check_writable(folder / kJson);
   check_writable(folder / kReport);
@@ -173,9 +176,9 @@ int blame(const BlameArguments& arguments) {
   blame.scenario = sim::text_field(summary, "scenario", "run");
   const auto seed = summary.find("seed");
   if (seed != summary.end() && seed->is_number_unsigned()) blame.seed = seed->get<std::uint64_t>();
-  const std::vector<sim::Experiment> experiments = sim::plan_experiments(
-      blame.scenario, load_yaml(run / "resolved.yaml"), blame.failed.outcome == "timed_out",
-      !flown_by_this_build(summary));
+  const std::vector<sim::Experiment> experiments =
+      sim::plan_experiments(blame.scenario, load_yaml(run / "resolved.yaml"),
+                            blame.failed.outcome == "timed_out", !flown_by_this_build(summary));
 
   const sim::OutputFolder made(folder_for(arguments, run));
   const fs::path folder = fs::canonical(made.path());

@@ -48,12 +48,11 @@ sim::Mid360Config at_rate(const SparseArguments& arguments, double rate_hz) {
 }  // namespace
 
 int sparse(const SparseArguments& arguments) {
-  const std::vector<double> thicknesses = numbers_of(
-      arguments.thicknesses_m, "--thickness", 1, {0.005, 0.01, 0.02, 0.03, 0.05, 0.1});
+  const std::vector<double> thicknesses =
+      numbers_of(arguments.thicknesses_m, "--thickness", 1, {0.005, 0.01, 0.02, 0.03, 0.05, 0.1});
   const std::vector<double> distances =
       numbers_of(arguments.distances_m, "--distance", kMost_m, {1, 2, 3, 4, 6, 8, 10, 15, 20});
-  const std::vector<double> rates =
-      numbers_of(arguments.rates_hz, "--rate", 50, {10, 20, 50});
+  const std::vector<double> rates = numbers_of(arguments.rates_hz, "--rate", 50, {10, 20, 50});
   const Pose X_BL = sim::load_airframe().X_BL;
   const std::uint64_t seed = arguments.seed.value_or(1);
   const sim::OutputFolder made(arguments.out);
@@ -73,20 +72,21 @@ int sparse(const SparseArguments& arguments) {
         query.distance_m = distance;
         query.frames = arguments.frames;
         const sim::SparseAnswer answer = sim::look_at_bars(query, lidar, X_BL, seed);
-        csv += fmt::format("{:g},{:g},{:g},{:.3f},{:.4f},{:.4f},{:.4f}\n", rate, thickness, distance,
-                           answer.returns_per_frame, answer.missed_one, answer.missed_lone,
-                           answer.missed_five);
+        csv += fmt::format("{:g},{:g},{:g},{:.3f},{:.4f},{:.4f},{:.4f}\n", rate, thickness,
+                           distance, answer.returns_per_frame, answer.missed_one,
+                           answer.missed_lone, answer.missed_five);
         curve.y.push_back(100 * answer.missed_one);
       }
       curves.push_back(curve);
     }
-    charts += sim::chart_html(fmt::format("One frame at {:g} Hz", rate), "distance, m",
-                              "missed, %", curves);
+    charts += sim::chart_html(fmt::format("One frame at {:g} Hz", rate), "distance, m", "missed, %",
+                              curves);
     charts += "<p class=\"map-key\">" + sim::key_html([&] {
                 std::vector<std::string> labels;
                 for (const sim::Curve& curve : curves) labels.push_back(curve.label);
                 return labels;
-              }()) + "</p>\n";
+              }()) +
+              "</p>\n";
   }
   write_atomically(folder / "sparse.csv", csv);
   write_atomically(folder / "sparse.html",

@@ -12,14 +12,14 @@ namespace {
 constexpr std::array<std::string_view, 5> kOfImu{"output_rate_hz", "magnetometer_rate_hz",
                                                  "barometer_rate_hz", "earth_field_gauss",
                                                  "sea_level_pressure_pa"};
-constexpr std::array<std::string_view, 8> kOfLidar{"type",    "position_m", "rotation_rad",
-                                                   "enabled", "rate_hz",    "pattern",
-                                                   "pattern_turn_deg", "misses_in_bag"};
+constexpr std::array<std::string_view, 8> kOfLidar{
+    "type",    "position_m", "rotation_rad",     "enabled",
+    "rate_hz", "pattern",    "pattern_turn_deg", "misses_in_bag"};
 constexpr std::array<std::string_view, 6> kOfCamera{"type",    "position_m", "rotation_rad",
                                                     "rate_hz", "width_px",   "height_px"};
-constexpr std::array<std::string_view, 9> kOfSpinning{
-    "type",       "position_m",  "rotation_rad", "rate_hz",    "rings",
-    "lowest_deg", "highest_deg", "columns",      "range_max_m"};
+constexpr std::array<std::string_view, 9> kOfSpinning{"type",        "position_m", "rotation_rad",
+                                                      "rate_hz",     "rings",      "lowest_deg",
+                                                      "highest_deg", "columns",    "range_max_m"};
 // How the maps take frames: what the survey needs otherwise, or would be wrong if it were odd.
 constexpr std::array<std::string_view, 6> kOfTaking{"latency_s", "confirm_frames", "decay_per_s",
                                                     "sensor",    "depth_min_m",    "depth_max_m"};
@@ -105,8 +105,8 @@ bool true_maps(ConfigNode& scenario) {
   set(scenario, std::string("devices.") + kSurvey + ".type=survey");
   set(scenario, std::string("mapping.lidar=") + kSurvey);
   // A frame shows all that is in sight: what was seen from elsewhere may have been misplaced.
-  for (const char* assignment : {"use_depth=false", "lone_range_m=0", "lidar_frames=1",
-                                 "remember=false"}) {
+  for (const char* assignment :
+       {"use_depth=false", "lone_range_m=0", "lidar_frames=1", "remember=false"}) {
     set(scenario, std::string("mapping.") + assignment);
   }
   return true;

@@ -99,15 +99,14 @@ ordered_json blame_json(const Blame& blame) {
 }
 
 std::string blame_table(const Blame& blame) {
-  std::string table =
-      fmt::format("{:<10} {:<38} {:<10} {:>8}  {}\n", "truth in", "by", "outcome", "time, s", "why");
+  std::string table = fmt::format("{:<10} {:<38} {:<10} {:>8}  {}\n", "truth in", "by", "outcome",
+                                  "time, s", "why");
   std::vector<FlightEnd> rows{blame.failed};
   rows.insert(rows.end(), blame.flights.begin(), blame.flights.end());
   for (const FlightEnd& flight : rows) {
     const bool is_run = &flight == &rows.front();
     table += fmt::format("{:<10} {:<38} {:<10} {:>8.1f}  {}\n", is_run ? "-" : flight.name,
-                         flight.text, flight.outcome, flight.sim_time_s,
-                         printable(flight.reason));
+                         flight.text, flight.outcome, flight.sim_time_s, printable(flight.reason));
   }
   return table + blame.verdict.text + "\n";
 }

@@ -39,8 +39,8 @@ CarriedMotion carried_along(const FlightView& view, const Truth& truth) {
   const Odometry& odometry = view.odometry;
   // From the frame in which the software thinks to the world, as far as a heading can tell.
   const Mat3 R_WO = heading_between(truth.X_WB.R, odometry.X_OB.R);
-  const Vec3 missing = spring(kPositionBandwidth, setpoint.p_OB - odometry.X_OB.p,
-                              setpoint.v_OB - odometry.v_OB);
+  const Vec3 missing =
+      spring(kPositionBandwidth, setpoint.p_OB - odometry.X_OB.p, setpoint.v_OB - odometry.v_OB);
   const Mat3 R_WB_wanted =
       R_WO * attitude_from_force(setpoint.a_OB + Vec3(0, 0, kGravity), setpoint.yaw_rad);
   const Vec3 turn = so3::Log(truth.X_WB.R.transpose() * R_WB_wanted);

@@ -5,8 +5,8 @@
 #include "stack/flight_software.h"
 
 /// A vehicle that is where the flight software means it to be: the oracle of control, for
-/// ablations. It is as good as a tracker can be, not better: what counts is the setpoint against the
-/// estimate, so that an odometry that is wrong leads it astray as it leads any tracker.
+/// ablations. It is as good as a tracker can be, not better: what counts is the setpoint against
+/// the estimate, so that an odometry that is wrong leads it astray as it leads any tracker.
 namespace arex::sim {
 
 /// Whether the software means the vehicle to be anywhere: not before the odometry has begun, nor

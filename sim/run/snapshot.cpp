@@ -167,8 +167,8 @@ Snapshot take_snapshot(Stamp stamp, const Odometry& odometry, const GridSnapshot
   for (const RegisteredScan& scan : frames.scans) {
     if (scan.stamp <= grid->stamp) scans.push_back(scan);
   }
-  const std::size_t held = std::min(
-      scans.size(), static_cast<std::size_t>(config.mapping.local.lidar_frames));
+  const std::size_t held =
+      std::min(scans.size(), static_cast<std::size_t>(config.mapping.local.lidar_frames));
   for (std::size_t i = scans.size() - held; i < scans.size(); ++i) {
     const std::vector<Vec3f>& points = *scans[i].points_O;
     snapshot.cloud.insert(snapshot.cloud.end(), points.begin(), points.end());
@@ -216,8 +216,8 @@ void SnapshotTaker::update(const Simulation& simulation) {
   const Stamp stamp = times_.front();
   times_.erase(times_.begin());
   const FlightView view = simulation.view();
-  const Snapshot snapshot = take_snapshot(stamp, view.odometry, view.grid.get(),
-                                          simulation.mapped_frames(), config_);
+  const Snapshot snapshot =
+      take_snapshot(stamp, view.odometry, view.grid.get(), simulation.mapped_frames(), config_);
   write_snapshot(folder_ / snapshot_name(stamp), snapshot, view.grid.get(),
                  config_.mapping.local.sensor);
 }
@@ -235,7 +235,7 @@ std::vector<std::string> snapshot_names(const fs::path& run) {
   std::vector<std::string> names;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(snapshots_folder(run), none)) {
-    names.push_back(entry.path().filename().string());
+    if (entry.is_directory(none)) names.push_back(entry.path().filename().string());
   }
   std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
     return std::strtod(a.c_str(), nullptr) < std::strtod(b.c_str(), nullptr);

@@ -17,8 +17,9 @@ inline constexpr std::array<std::string_view, 4> kSnapshotParts{"scan", "cloud",
 /// the grid's heights: crowns would hide everything below them.
 [[nodiscard]] RgbImage draw_snapshot(const Snapshot& snapshot, SnapshotPart part);
 
-/// As the paper's figure of its maps, (a) to (d): above the newest LiDAR frame alone, below all that
-/// the grid holds; on the left what the planner may not enter, on the right the points themselves.
+/// As the paper's figure of its maps, (a) to (d): above the newest LiDAR frame alone, below all
+/// that the grid holds; on the left what the planner may not enter, on the right the points
+/// themselves.
 [[nodiscard]] RgbImage draw_snapshot(const Snapshot& snapshot);
 
 }  // namespace arex::sim

@@ -29,8 +29,10 @@ std::string chosen_name(const fs::path& run, std::optional<double> time_s) {
   for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
   throw ConfigError(time_s ? fmt::format("--time {:g}: no snapshot of that time in {}, expected {}",
                                          *time_s, run.string(), all)
-                           : run.string() + ": holds several snapshots, expected --time with one "
-                                            "of " + all);
+                           : run.string() +
+                                 ": holds several snapshots, expected --time with one "
+                                 "of " +
+                                 all);
 }
 
 double number_field(const ordered_json& json, const char* key, const fs::path& file) {

@@ -53,8 +53,7 @@ std::vector<Vec3f> SurveyLidar::points_near(const Vec3& p_W) const {
   const Vec2 reach = Vec2::Constant(config_.range_m);
   const Vec2 p = p_W.head<2>();
   const Eigen::Vector2i from = tile_of(p - reach, low_).cwiseMax(0);
-  const Eigen::Vector2i to =
-      tile_of(p + reach, low_).cwiseMin(tiles_ - Eigen::Vector2i::Ones());
+  const Eigen::Vector2i to = tile_of(p + reach, low_).cwiseMin(tiles_ - Eigen::Vector2i::Ones());
   const Vec3f centre = p_W.cast<float>();
   const auto range2 = static_cast<float>(config_.range_m * config_.range_m);
   for (int y = from.y(); y <= to.y(); ++y) {

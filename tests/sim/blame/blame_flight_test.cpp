@@ -22,8 +22,8 @@ const std::vector<std::string> kBlind{"odometry.source=mocap", "lidar.enabled=fa
 class Failure {
  public:
   explicit Failure(const std::vector<std::string>& overrides) {
-    std::vector<std::string> arguments{"run", kLegs, "--quiet", "--no-report", "--out",
-                                       run().string()};
+    std::vector<std::string> arguments{"run",         kLegs,   "--quiet",
+                                       "--no-report", "--out", run().string()};
     for (const std::string& assignment : overrides) {
       arguments.insert(arguments.end(), {"--set", assignment});
     }
@@ -73,8 +73,7 @@ TEST(Blame, LaysWindThatNoTrackerHoldsToTheTracking) {
 }
 
 TEST(Blame, LaysAJumpOfTheOriginToTheOdometry) {
-  const Failure failure(
-      blind({"mocap.fault_jump_from_s=9", "mocap.fault_jump_m=[0, 5, 0]"}));
+  const Failure failure(blind({"mocap.fault_jump_from_s=9", "mocap.fault_jump_m=[0, 5, 0]"}));
   EXPECT_TRUE(failure.verdict().starts_with("odometry: ")) << failure.blame().out;
   EXPECT_EQ(failure.outcome_with("tracking"), failure.json()["failed"]["outcome"]);
 }
@@ -110,8 +109,8 @@ TEST(Blame, RefusesWhatCannotBeBlamedWithOneLine) {
   expect_refused({"blame", folder.path().string()}, "holds no run");
   expect_refused({"blame", folder.path().string(), "--jobs", "0"}, "--jobs: is '0'");
   const std::filesystem::path run = folder / "run";
-  std::vector<std::string> arguments{"run", kLegs, "--quiet", "--no-report", "--out", run.string(),
-                                     "--set", "mission.max_time_s=1"};
+  std::vector<std::string> arguments{"run",   kLegs,        "--quiet", "--no-report",
+                                     "--out", run.string(), "--set",   "mission.max_time_s=1"};
   for (const std::string& assignment : kBlind) {
     arguments.insert(arguments.end(), {"--set", assignment});
   }

@@ -74,7 +74,8 @@ TEST(Experiments, TrueOdometryIsAMotionCaptureWithoutFault) {
   expect_choices(config);
   EXPECT_EQ(config.stack.odometry.source, "mocap");
   EXPECT_FALSE(config.imu.noise_free);
-  const std::string jumps = spoiled("mocap: {fault_jump_m: [0, 2, 0]}\nodometry: {source: mocap}\n");
+  const std::string jumps =
+      spoiled("mocap: {fault_jump_m: [0, 2, 0]}\nodometry: {source: mocap}\n");
   EXPECT_EQ(replaced(BlamedModule::kOdometry, jumps).mocap.fault_jump_m, Vec3::Zero());
   replaced(BlamedModule::kOdometry, spoiled("odometry: {source: mocap}\n"), false);
 }
@@ -137,12 +138,11 @@ TEST(Experiments, ArePlannedForEachModuleAndAllTogether) {
 // Whatever ships can be blamed.
 TEST(Experiments, CanBePlannedForEveryScenario) {
   std::size_t seen = 0;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios")) {
+  for (const auto& entry : std::filesystem::directory_iterator(AREX_SOURCE_DIR "/scenarios")) {
     if (entry.path().extension() != ".yaml") continue;
     const Scenario scenario = load_scenario(entry.path(), {}, {});
-    const auto plan = plan_experiments(scenario.name, parse_yaml(scenario.resolved_yaml(), "run"),
-                                       true, false);
+    const auto plan =
+        plan_experiments(scenario.name, parse_yaml(scenario.resolved_yaml(), "run"), true, false);
     EXPECT_GE(plan.size(), 5U) << entry.path();
     ++seen;
   }

@@ -58,8 +58,12 @@ TEST(Verdict, BlamesNobodyForWhatThisBuildDoesNotDo) {
 }
 
 TEST(Verdict, StandsInJsonAndTable) {
-  Blame blame{"/runs/x", "x", 7, flight("as_flown", "stuck"),
-              {flight("sensors", "stuck"), flight("maps", "succeeded")}, {}};
+  Blame blame{"/runs/x",
+              "x",
+              7,
+              flight("as_flown", "stuck"),
+              {flight("sensors", "stuck"), flight("maps", "succeeded")},
+              {}};
   blame.failed.reason = "no\npath";
   blame.verdict = judge(blame.flights);
   const nlohmann::ordered_json json = blame_json(blame);

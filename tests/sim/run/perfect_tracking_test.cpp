@@ -11,15 +11,18 @@ namespace arex::sim {
 namespace {
 
 // Gains that do not hold the vehicle, in a wind that would carry it off; sensors do not matter.
-const std::vector<std::string> kHopeless{
-    "odometry.source=mocap",          "lidar.enabled=false",
-    "mapping.use_depth=false",        "control.position_gain=[0.5, 0.5, 12]",
-    "control.velocity_gain=[1, 1, 7.8]", "control.observe_disturbance=false",
-    "physics.wind.mean_mps=[6, 3, 0]", "mission.max_time_s=200"};
+const std::vector<std::string> kHopeless{"odometry.source=mocap",
+                                         "lidar.enabled=false",
+                                         "mapping.use_depth=false",
+                                         "control.position_gain=[0.5, 0.5, 12]",
+                                         "control.velocity_gain=[1, 1, 7.8]",
+                                         "control.observe_disturbance=false",
+                                         "physics.wind.mean_mps=[6, 3, 0]",
+                                         "mission.max_time_s=200"};
 
 FlightResult fly(std::vector<std::string> overrides, std::uint64_t seed) {
-  Simulation simulation(
-      load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", overrides, seed), 1);
+  Simulation simulation(load_scenario(AREX_SOURCE_DIR "/scenarios/waypoints.yaml", overrides, seed),
+                        1);
   while (simulation.tick()) {
   }
   return simulation.finish();
@@ -37,7 +40,8 @@ TEST(PerfectTracking, FliesTheSetpointWhateverBlowsAndWhoeverControls) {
   }
 }
 
-// The rigid body does what is asked of it, in free air, about B's origin and not the centre of mass.
+// The rigid body does what is asked of it, in free air, about B's origin and not the centre of
+// mass.
 TEST(PerfectTracking, TheWrenchGivesTheMotionAskedFor) {
   const worlds::World world = fixtures::floor_world();
   RandomStream random(3, "motions");

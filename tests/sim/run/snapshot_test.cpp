@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
-
-#include <nlohmann/json.hpp>
 #include <octomap/octomap.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "clouds/pcd_reader.h"
@@ -22,8 +21,8 @@ using test::write_text;
 constexpr const char* kScenario = AREX_SOURCE_DIR "/scenarios/gaps.yaml";
 
 test::ProcessResult fly(const std::filesystem::path& out, const std::vector<std::string>& more) {
-  std::vector<std::string> arguments{"run",      kScenario, "--set", "mission.max_time_s=9",
-                                     "--quiet",  "--no-report", "--out", out.string()};
+  std::vector<std::string> arguments{"run",     kScenario,     "--set", "mission.max_time_s=9",
+                                     "--quiet", "--no-report", "--out", out.string()};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run_process(AREX_BINARY, arguments);
 }

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "run/scenario.h"
+#include "sensors/fault.h"
 
 namespace arex::sim {
 namespace {
@@ -54,6 +55,22 @@ void set(ConfigNode& scenario, const std::string& assignment) {
   apply_override(scenario, assignment);
 }
 
+/// Leaves out the faults of what `concerns` says of a device's name.
+template <class Concerns>
+void erase_faults(ConfigNode& scenario, const Concerns& concerns) {
+  ConfigNode* faults = find(scenario, "faults");
+  if (!faults) return;
+  std::erase_if(faults->items, [&](const ConfigNode& fault) {
+    const ConfigNode* device = fault.find("device");
+    return device && concerns(device->scalar);
+  });
+}
+
+bool is_sensor(const std::string& device) {
+  const FaultyPart part = faulty_part(device);
+  return part != FaultyPart::kMotor && part != FaultyPart::kEsc && part != FaultyPart::kBattery;
+}
+
 void clean_devices(ConfigNode& scenario) {
   ConfigNode* devices = find(scenario, "devices");
   if (!devices) return;
@@ -72,6 +89,10 @@ bool clean_sensors(ConfigNode& scenario) {
   if (ConfigNode* imu = find(scenario, "imu")) keep_only(*imu, kOfImu);
   if (ConfigNode* lidar = find(scenario, "lidar")) keep_only(*lidar, kOfLidar);
   if (ConfigNode* depth = find(scenario, "depth")) keep_only(*depth, kOfCamera);
+  if (ConfigNode* infrared = find(scenario, "infrared")) {
+    for (const char* key : {"clock_offset_s", "mount_error_rad"}) erase(*infrared, key);
+  }
+  erase_faults(scenario, is_sensor);
   if (ConfigNode* physics = find(scenario, "physics")) {
     erase(*physics, "lidar_mount");
     erase(*physics, "camera_mount");
@@ -93,6 +114,7 @@ bool true_odometry(ConfigNode& scenario) {
   }();
   if (scalar_at(scenario, {"odometry", "source"}) == "mocap" && sound) return false;
   erase(scenario, "mocap");
+  erase_faults(scenario, [](const std::string& device) { return device == "mocap"; });
   set(scenario, "odometry.source=mocap");
   return true;
 }

@@ -235,7 +235,7 @@ std::vector<std::string> snapshot_names(const fs::path& run) {
   std::vector<std::string> names;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(snapshots_folder(run), none)) {
-    names.push_back(entry.path().filename().string());
+    if (entry.is_directory(none)) names.push_back(entry.path().filename().string());
   }
   std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
     return std::strtod(a.c_str(), nullptr) < std::strtod(b.c_str(), nullptr);

@@ -40,18 +40,23 @@ worlds::World world_of_bars(const SparseQuery& query) {
   return world;
 }
 
-/// Counts the returns that lie about each bar.
+/// Counts the returns that lie about each bar, each for the nearest one.
 void count_returns(const LidarScan& scan, const Pose& X_BL, const SparseQuery& query,
                    std::vector<int>& counts) {
   const std::vector<double> headings = bar_headings();
   for (const LidarPoint& point : scan.points) {
     const Vec3 p = X_BL * point.p_L.cast<double>();
+    if (std::abs(p.z()) > 0.5 * query.length_m + kNearAxis_m) continue;
+    double nearest = kNearAxis_m;
+    std::size_t found = headings.size();
     for (std::size_t bar = 0; bar < headings.size(); ++bar) {
       const Vec2 axis = query.distance_m * Vec2(std::cos(headings[bar]), std::sin(headings[bar]));
-      const bool near = (p.head<2>() - axis).norm() <= kNearAxis_m &&
-                        std::abs(p.z()) <= 0.5 * query.length_m + kNearAxis_m;
-      if (near) ++counts[bar];
+      const double distance = (p.head<2>() - axis).norm();
+      if (distance > nearest) continue;
+      nearest = distance;
+      found = bar;
     }
+    if (found < headings.size()) ++counts[found];
   }
 }
 

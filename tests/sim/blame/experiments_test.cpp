@@ -14,7 +14,7 @@ std::string spoiled(const std::string& more = "") {
   return make_scenario("spoiled", parse_yaml(R"(
 seed: 5
 world: {kind: gaps}
-imu: {gyro_range_radps: 2.5, clock_offset_s: 0.02, output_rate_hz: 100, vibration: {level: harsh}}
+imu: {gyro_range_radps: 2.5, clock_offset_s: 0.02, output_rate_hz: 100, vibration: {level: rough}}
 lidar: {rate_hz: 20, fault_silent_from_s: 5, fault_silent_for_s: 100, latency_s: 0.04,
         extrinsic_rotation_error_rad: [0, 0.1, 0], echo: {false_alarm_probability: 0.01}}
 depth: {disparity_sigma_px: 0.5, width_px: 424, height_px: 240}
@@ -69,6 +69,15 @@ TEST(Experiments, SensorsWithoutNoiseHaveNoFaultAndSitWhereTheyShould) {
   EXPECT_EQ(config.physics.wind.mean_mps.x(), 5);
 }
 
+TEST(Experiments, SensorsWithoutFaultsLeaveTheMotorsTheirs) {
+  const ScenarioConfig config = replaced(
+      BlamedModule::kSensors,
+      spoiled("faults: [{device: lidar, kind: silent}, {device: motor, kind: weak}, {device: side, "
+              "kind: noisy}, {device: infrared, kind: blinded}]\n"));
+  ASSERT_EQ(config.faults.size(), 1U);
+  EXPECT_EQ(config.faults[0].device, "motor");
+}
+
 TEST(Experiments, TrueOdometryIsAMotionCaptureWithoutFault) {
   const ScenarioConfig config = replaced(BlamedModule::kOdometry, spoiled());
   expect_choices(config);
@@ -103,7 +112,8 @@ TEST(Experiments, PerfectTrackingLeavesTheWindWhereItIs) {
   expect_choices(config);
   EXPECT_TRUE(config.physics.perfect_tracking);
   EXPECT_EQ(config.physics.wind.mean_mps.x(), 5);
-  replaced(BlamedModule::kTracking, spoiled(""), true);
+  ConfigNode carried = parse_yaml("physics: {perfect_tracking: true}\n", "carried");
+  EXPECT_FALSE(replace_by_truth(BlamedModule::kTracking, carried));
 }
 
 TEST(Experiments, ArePlannedForEachModuleAndAllTogether) {

@@ -109,7 +109,7 @@ TEST(Landing, MeansTheSameInAHallBelowTheStart) {
     std::int16_t& overhead = hall.map.floor.overhead[i];
     overhead = overhead == FloorMap::kNothing ? -50 : static_cast<std::int16_t>(overhead - 80);
   }
-  hall.map.ground = {hall.map.origin, 20, 1, {-8.0F}};  // and a ceiling 3 m above it
+  hall.map.ground = {hall.map.origin, 20, 1, {-8.0F}, {}};  // and a ceiling 3 m above it
   hall.explorer.follow_ground = true;
   EXPECT_EQ(hall.finder().assess(hall.map, hall.at(50, 40, -6.5)), LandingGround::kClear);
   EXPECT_EQ(hall.finder().assess(hall.map, hall.at(100, 40, -6.5)), LandingGround::kObstructed);

@@ -173,7 +173,7 @@ TEST(FailureStories, InflationThatClosesAroundTheVehicleTrapsThePapersProgram) {
                                 std::string("planning.replan.recovers=") + recovers,
                                 "odometry.source=mocap", "mapping.use_depth=false"});
   };
-  const Flown half = hover("0.5", "false");
+  const Flown half = hover("0.5", "true");
   EXPECT_EQ(half.result.outcome, Outcome::kSucceeded) << half.result.reason;
   const Flown trapped = hover("0.75", "false");
   EXPECT_EQ(trapped.result.outcome, Outcome::kStuck);

@@ -20,6 +20,14 @@ PinholeCamera finer(const PinholeCamera& camera, int samples) {
           samples * camera.fy,    samples * camera.cx + shift, samples * camera.cy + shift};
 }
 
+/// Share of the sun that reaches a surface of unit normal n, on either side: asked for off the
+/// surface, by more than its slope makes of a texel of the map.
+float sun_on(const SunMap& sun, const Vec3f& p, const Vec3f& n) {
+  constexpr double kTexels = 2;
+  const auto off = static_cast<float>(kTexels * sun.texel_m());
+  return sun.visible(p + (n.dot(sun.direction_W()) > 0 ? off : -off) * n);
+}
+
 Float8 root(const Float8& v) {
   Float8 out;
   for (int i = 0; i < 8; ++i) out[i] = std::sqrt(v[i]);
@@ -88,7 +96,7 @@ float InfraredShader::surface(const View& view, std::uint32_t triangle, const Ve
   const Vec3f p = view.eye_W + z * ray_W;
   const Side side = side_of(facet, material, from_behind);
   float lux = indirect(side, material, p);
-  if (side.sun_lx > 0) lux += side.sun_lx * sun_.visible(p);
+  if (side.sun_lx > 0) lux += side.sun_lx * sun_on(sun_, p, side.normal_W);
   return facet.albedo * lux * textured(facet, material, p, ray_W, z, towards);
 }
 
@@ -151,7 +159,9 @@ void InfraredShader::eight_pixels(const View& view, const Vec3f& row_W, int u,
     const Side side = side_of(facet, material, from_behind);
     const float begin = indirect(side, material, at(0)), end = indirect(side, material, at(7));
     lux = begin + (end - begin) * (1.0F / 7) * Float8{0, 1, 2, 3, 4, 5, 6, 7};
-    for (int i = 0; i < 8 && side.sun_lx > 0; ++i) lux[i] += side.sun_lx * sun_.visible(at(i));
+    for (int i = 0; i < 8 && side.sun_lx > 0; ++i) {
+      lux[i] += side.sun_lx * sun_on(sun_, at(i), side.normal_W);
+    }
     lux *= facet.albedo;
   }
   if (!facet.glows) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "../sensors_depth/depth_scenes.h"
@@ -178,6 +179,35 @@ TEST(InfraredShader, SunlitSurfacesAreBrighterThanThoseInShadow) {
   }
   EXPECT_GT(sum_sunny, 1.5 * sum_dull);
   EXPECT_LT(darker, ground / 100);
+}
+
+// Where the sun strikes at a slant, a texel of its map covers much depth: nothing may speckle.
+TEST(InfraredShader, ASlopeInTheSunDoesNotShadeItself) {
+  for (const double tilt : {0.0, 0.1, 0.2}) {
+    const Vec3 normal(-std::sin(tilt), 0, std::cos(tilt));
+    const worlds::World world = plane_world({0, 0, -1.5}, normal, 30);
+    const Scene scene(world);
+    InfraredLightConfig light;
+    light.sun_azimuth_rad = 0.3;
+    light.sun_elevation_rad = 0.35;
+    InfraredShader with(light, world, scene, kCamera);
+    light.sun = false;
+    InfraredShader without(light, world, scene, kCamera);
+    InfraredScene sunny, dull;
+    with.draw(forward_camera(), sunny);
+    without.draw(forward_camera(), dull);
+    float least = 1e9F, most = 0;
+    for (int v = 330; v < 470; ++v) {
+      for (int u = 100; u < 750; ++u) {
+        const std::size_t i = index_of(kCamera, u, v);
+        const float ratio = sunny.light_lx[i] / dull.light_lx[i];
+        least = std::min(least, ratio);
+        most = std::max(most, ratio);
+      }
+    }
+    EXPECT_GT(least, 1.2F) << tilt;
+    EXPECT_LT(most, 1.3F * least) << tilt;
+  }
 }
 
 TEST(InfraredShader, TheGarageIsLitByItsLampsAlone) {

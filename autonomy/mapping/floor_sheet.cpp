@@ -1,13 +1,11 @@
 #include "mapping/floor_sheet.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <deque>
-#include <span>
 #include <utility>
 
-#include "mapping/bits.h"
+#include "mapping/morton_columns.h"
 
 namespace arex {
 namespace {
@@ -22,7 +20,8 @@ constexpr int kStandLayers = 3;
 constexpr int kTolerance = 1;
 /// A plane that went on over the unseen may be further off by a layer each so many tiles, up to so
 /// many layers: O's tilt, half a degree, is one in ten metres.
-constexpr int kGuessedPerLayer = 4, kMostGuessedLayers = 2;
+constexpr int kGuessedPerLayer = 4;
+constexpr int kMostGuessedLayers = FloorSheet::kMostTolerance - kTolerance;
 /// Planes that differ by less at a tile's corners say the same: the 2D map is not made anew.
 constexpr double kSame = 1.0;
 /// Neighbours whose floors are further apart than this do not meet; half a band, that what is free
@@ -41,135 +40,8 @@ constexpr int kMostDived = 10;
 constexpr double kUnder = 25;
 /// Tiles that a floor goes on under another: enough unknown area to be worth a flight.
 constexpr int kMostUnder = 3;
-constexpr double kLevel = 0.2;  ///< layers per column: floors of less slope are level
 /// Layers of the vehicle above the floor that it flies over.
 constexpr double kLeastAbove = 3, kMostAbove = 35;
-constexpr int kLeastForSlope = 12;          ///< columns
-constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
-constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
-constexpr double kOutlier_layers = 1.5;
-/// Feet further than this from all that is expected of a tile are none of its floor: it rises by a
-/// layer a column at most, from somewhere within the tolerance.
-constexpr int kReach = kBrickCells + kTolerance + kMostGuessedLayers;
-constexpr std::size_t kMostLayers = 2 * kReach + 2 * kBrickCells;
-
-/// Masks of the columns whose x (in bits 0, 2, 4 of the index) is 0 mod 2, 1 mod 4, and 3.
-constexpr std::uint64_t columns_where(int modulus, int rest, int bit) {
-  std::uint64_t out = 0;
-  for (int i = 0; i < 64; ++i) {
-    const int c = (i >> bit & 1) | (i >> (bit + 2) & 1) << 1 | (i >> (bit + 4) & 1) << 2;
-    if (c % modulus == rest) out |= std::uint64_t{1} << i;
-  }
-  return out;
-}
-
-/// The columns one further on along an axis (bit 0: x, bit 1: y); from 7 on they are lost. In
-/// Morton order a step from an even column is 1 bit, from 1 or 5 it is 3, from 3 it is 11.
-template <int kAxis>
-std::uint64_t shift_up(std::uint64_t columns) {
-  constexpr std::uint64_t even = columns_where(2, 0, kAxis), one = columns_where(4, 1, kAxis);
-  constexpr std::uint64_t three = columns_where(8, 3, kAxis);
-  return (columns & even) << (1 << kAxis) | (columns & one) << (3 << kAxis) |
-         (columns & three) << (11 << kAxis);
-}
-template <int kAxis>
-std::uint64_t shift_down(std::uint64_t columns) {
-  constexpr std::uint64_t odd = columns_where(2, 1, kAxis), two = columns_where(4, 2, kAxis);
-  constexpr std::uint64_t four = columns_where(8, 4, kAxis);
-  return (columns & odd) >> (1 << kAxis) | (columns & two) >> (3 << kAxis) |
-         (columns & four) >> (11 << kAxis);
-}
-
-/// The columns and their eight neighbours.
-std::uint64_t with_neighbours(std::uint64_t columns) {
-  columns |= shift_up<0>(columns) | shift_down<0>(columns);
-  return columns | shift_up<1>(columns) | shift_down<1>(columns);
-}
-
-int x_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x15)); }
-int y_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x2a)); }
-
-/// A column of a floor: its place in the tile, and the layer in which it lies there.
-struct Sample {
-  double x = 0, y = 0, layer = 0;
-};
-struct Samples {
-  std::array<Sample, 64> of;
-  int count = 0;
-
-  [[nodiscard]] std::span<const Sample> all() const {
-    return std::span(of).first(static_cast<std::size_t>(count));
-  }
-  void drop(const auto& is_off) {
-    const auto end = std::remove_if(of.begin(), of.begin() + count, is_off);
-    count = static_cast<int>(end - of.begin());
-  }
-};
-
-/// From the columns that are floor to their neighbours, by a layer at most, until there are no
-/// more.
-void go_on_column_by_column(std::span<const FloorSheet::Feet> feet,
-                            std::array<std::uint64_t, kMostLayers>& floor) {
-  for (bool grows = true; grows;) {
-    grows = false;
-    for (std::size_t k = 0; k < feet.size(); ++k) {
-      std::uint64_t near = floor[k];
-      if (k > 0 && feet[k - 1].layer == feet[k].layer - 1) near |= floor[k - 1];
-      if (k + 1 < feet.size() && feet[k + 1].layer == feet[k].layer + 1) near |= floor[k + 1];
-      if (near == 0) continue;
-      const std::uint64_t more = with_neighbours(near) & feet[k].columns & ~floor[k];
-      grows |= more != 0;
-      floor[k] |= more;
-    }
-  }
-}
-
-/// Of each column the lowest.
-Samples samples_of(std::span<const FloorSheet::Feet> feet,
-                   const std::array<std::uint64_t, kMostLayers>& floor) {
-  Samples samples;
-  std::uint64_t taken = 0;
-  for (std::size_t k = 0; k < feet.size(); ++k) {
-    for (std::uint64_t bits = floor[k] & ~taken; bits != 0; bits &= bits - 1) {
-      const int i = std::countr_zero(bits);
-      samples.of[static_cast<std::size_t>(samples.count++)] = {static_cast<double>(x_of(i)),
-                                                               static_cast<double>(y_of(i)),
-                                                               static_cast<double>(feet[k].layer)};
-    }
-    taken |= floor[k];
-  }
-  return samples;
-}
-
-/// Least squares; along axes on which the samples say nothing, with the rise expected there.
-TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
-  const auto n = static_cast<double>(samples.count);
-  Sample mean;
-  for (const Sample& s : samples.all()) {
-    mean.x += s.x / n;
-    mean.y += s.y / n;
-    mean.layer += s.layer / n;
-  }
-  double xx = 0, yy = 0, xy = 0, xz = 0, yz = 0;
-  for (const Sample& s : samples.all()) {
-    const double x = s.x - mean.x, y = s.y - mean.y, z = s.layer - mean.layer;
-    xx += x * x / n;
-    yy += y * y / n;
-    xy += x * y / n;
-    xz += x * z / n;
-    yz += y * z / n;
-  }
-  TilePlane plane;
-  plane.rise = expected_rise;
-  const double determinant = xx * yy - xy * xy;
-  const bool tells = samples.count >= kLeastForSlope && std::min(xx, yy) >= kLeastSpread &&
-                     determinant >= kLeastIndependence * xx * yy;
-  if (tells) plane.rise = Vec2(yy * xz - xy * yz, xx * yz - xy * xz) / determinant;
-  plane.height = mean.layer + plane.rise.x() * (TilePlane::kMiddle - mean.x) +
-                 plane.rise.y() * (TilePlane::kMiddle - mean.y);
-  return plane;
-}
-
 TilePlane shifted(const TilePlane& plane, const Eigen::Vector2i& step) {
   TilePlane there = plane;
   there.height += kBrickCells * (plane.rise.x() * step.x() + plane.rise.y() * step.y());
@@ -187,18 +59,6 @@ bool say_the_same(const TilePlane& a, const TilePlane& b) {
 }
 
 }  // namespace
-
-ColumnLayers::ColumnLayers(const TilePlane& plane) {
-  std::array<int, 64> layers{};
-  for (int i = 0; i < 64; ++i) {
-    layers[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(plane.at(x_of(i), y_of(i))));
-  }
-  low_ = *std::min_element(layers.begin(), layers.end());
-  count_ = *std::max_element(layers.begin(), layers.end()) - low_ + 1;
-  for (std::size_t i = 0; i < 64; ++i) {
-    columns_[static_cast<std::size_t>(layers[i] - low_)] |= std::uint64_t{1} << i;
-  }
-}
 
 FloorSheet::FloorSheet(int width, int height, double tile_m, double max_slope, int support)
     : width_(width),
@@ -444,33 +304,6 @@ FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& st
   label.plane.rise *= 0.5;
   label.guessed = from.guessed + 1;
   return label;
-}
-
-std::optional<TilePlane> FloorSheet::find_floor(const std::vector<Feet>& feet,
-                                                const TilePlane& expected, int tolerance) const {
-  const ColumnLayers layers(expected);
-  const int low = layers.lowest() - kReach, high = layers.highest() + kReach;
-  const auto from = [](const Feet& f, int layer) { return f.layer < layer; };
-  const auto begin = std::lower_bound(feet.begin(), feet.end(), low, from);
-  const std::span<const Feet> near(begin, std::lower_bound(begin, feet.end(), high, from));
-  std::array<std::uint64_t, kMostLayers> floor{};
-  for (std::size_t k = 0; k < near.size(); ++k) {
-    const int layer = near[k].layer;
-    floor[k] = near[k].columns & layers.between(layer - tolerance, layer + tolerance + 1);
-  }
-  go_on_column_by_column(near, floor);
-  Samples samples = samples_of(near, floor);
-  if (samples.count < support_) return std::nullopt;
-  // Twice: the second time without what stands on it or leans against it.
-  TilePlane plane = fit_plane(samples, expected.rise);
-  samples.drop(
-      [&](const Sample& s) { return std::abs(s.layer - plane.at(s.x, s.y)) > kOutlier_layers; });
-  if (samples.count < support_) return std::nullopt;
-  plane = fit_plane(samples, expected.rise);
-  if (plane.rise.norm() > max_slope_) return std::nullopt;
-  // A ramp shows its slope; what only lies near where it would go on is the foot of a wall.
-  const bool shown = samples.count >= kLeastForSlope || plane.rise.norm() < kLevel;
-  return shown ? std::optional(plane) : std::nullopt;
 }
 
 void FloorSheet::find_brinks(std::vector<std::uint64_t>& brinks) const {

@@ -96,6 +96,8 @@ class FloorSheet {
   [[nodiscard]] std::uint64_t brinks(std::size_t tile) const { return tiles_[tile].brinks; }
 
   static constexpr double kCorridor_m = 2.0;
+  static constexpr int kMostTolerance = 3;  ///< layers between a floor and where it is expected
+  static constexpr double kLevel = 0.2;     ///< layers per column: floors of less slope are level
 
  private:
   struct Label {

@@ -30,7 +30,8 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
       "sim_time_s",      "wall_time_s",   "cpu_time_s",      "real_time_factor",
       "trajectory_hash", "sensor_hash",   "distance_m",      "targets.count",
       "odometry.source", "collisions",    "battery.used_wh", "battery.remaining_fraction",
-      "build.version",   "build.compiler"};
+      "build.version",   "build.compiler", "faults.events", "yaw.spins",
+      "yaw.turned_rad",  "yaw.fastest_radps"};
   result.trajectory_hash = result.sensor_hash = "0";
   Scenario scenario;
   scenario.name = "s";
@@ -52,7 +53,8 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
                                "planner.replans",
                                "planner.failures",
                                "planner.retimed",
-                               "planner.slowed"};
+                               "planner.slowed",
+                               "planner.emergency_stops"};
   for (std::size_t stage = 1; stage < kPlanStageNames.size(); ++stage) {
     counts.insert("planner.stages." + std::string(kPlanStageNames[stage]));
   }

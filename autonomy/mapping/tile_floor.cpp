@@ -1,0 +1,144 @@
+// What is one tile's own of the floor: which of its columns are floor, and the plane through them.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <span>
+
+#include "mapping/floor_sheet.h"
+#include "mapping/morton_columns.h"
+
+namespace arex {
+namespace {
+
+constexpr int kLeastForSlope = 12;          ///< columns
+constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
+constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
+constexpr double kOutlier_layers = 1.5;
+/// Feet further than this from all that is expected of a tile are none of its floor: it rises by a
+/// layer a column at most, from somewhere within the tolerance.
+constexpr int kReach = kBrickCells + FloorSheet::kMostTolerance;
+constexpr std::size_t kMostLayers = 2 * kReach + 2 * kBrickCells;
+
+/// A column of a floor: its place in the tile, and the layer in which it lies there.
+struct Sample {
+  double x = 0, y = 0, layer = 0;
+};
+struct Samples {
+  std::array<Sample, 64> of;
+  int count = 0;
+
+  [[nodiscard]] std::span<const Sample> all() const {
+    return std::span(of).first(static_cast<std::size_t>(count));
+  }
+  void drop(const auto& is_off) {
+    const auto end = std::remove_if(of.begin(), of.begin() + count, is_off);
+    count = static_cast<int>(end - of.begin());
+  }
+};
+
+/// From the columns that are floor to their neighbours, by a layer at most, until there are no
+/// more.
+void go_on_column_by_column(std::span<const FloorSheet::Feet> feet,
+                            std::array<std::uint64_t, kMostLayers>& floor) {
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (std::size_t k = 0; k < feet.size(); ++k) {
+      std::uint64_t near = floor[k];
+      if (k > 0 && feet[k - 1].layer == feet[k].layer - 1) near |= floor[k - 1];
+      if (k + 1 < feet.size() && feet[k + 1].layer == feet[k].layer + 1) near |= floor[k + 1];
+      if (near == 0) continue;
+      const std::uint64_t more = with_neighbours(near) & feet[k].columns & ~floor[k];
+      grows |= more != 0;
+      floor[k] |= more;
+    }
+  }
+}
+
+/// Of each column the lowest.
+Samples samples_of(std::span<const FloorSheet::Feet> feet,
+                   const std::array<std::uint64_t, kMostLayers>& floor) {
+  Samples samples;
+  std::uint64_t taken = 0;
+  for (std::size_t k = 0; k < feet.size(); ++k) {
+    for (std::uint64_t bits = floor[k] & ~taken; bits != 0; bits &= bits - 1) {
+      const int i = std::countr_zero(bits);
+      samples.of[static_cast<std::size_t>(samples.count++)] = {static_cast<double>(x_of(i)),
+                                                               static_cast<double>(y_of(i)),
+                                                               static_cast<double>(feet[k].layer)};
+    }
+    taken |= floor[k];
+  }
+  return samples;
+}
+
+/// Least squares; along axes on which the samples say nothing, with the rise expected there.
+TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
+  const auto n = static_cast<double>(samples.count);
+  Sample mean;
+  for (const Sample& s : samples.all()) {
+    mean.x += s.x / n;
+    mean.y += s.y / n;
+    mean.layer += s.layer / n;
+  }
+  double xx = 0, yy = 0, xy = 0, xz = 0, yz = 0;
+  for (const Sample& s : samples.all()) {
+    const double x = s.x - mean.x, y = s.y - mean.y, z = s.layer - mean.layer;
+    xx += x * x / n;
+    yy += y * y / n;
+    xy += x * y / n;
+    xz += x * z / n;
+    yz += y * z / n;
+  }
+  TilePlane plane;
+  plane.rise = expected_rise;
+  const double determinant = xx * yy - xy * xy;
+  const bool tells = samples.count >= kLeastForSlope && std::min(xx, yy) >= kLeastSpread &&
+                     determinant >= kLeastIndependence * xx * yy;
+  if (tells) plane.rise = Vec2(yy * xz - xy * yz, xx * yz - xy * xz) / determinant;
+  plane.height = mean.layer + plane.rise.x() * (TilePlane::kMiddle - mean.x) +
+                 plane.rise.y() * (TilePlane::kMiddle - mean.y);
+  return plane;
+}
+
+}  // namespace
+
+ColumnLayers::ColumnLayers(const TilePlane& plane) {
+  std::array<int, 64> layers{};
+  for (int i = 0; i < 64; ++i) {
+    layers[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(plane.at(x_of(i), y_of(i))));
+  }
+  low_ = *std::min_element(layers.begin(), layers.end());
+  count_ = *std::max_element(layers.begin(), layers.end()) - low_ + 1;
+  for (std::size_t i = 0; i < 64; ++i) {
+    columns_[static_cast<std::size_t>(layers[i] - low_)] |= std::uint64_t{1} << i;
+  }
+}
+
+std::optional<TilePlane> FloorSheet::find_floor(const std::vector<Feet>& feet,
+                                                const TilePlane& expected, int tolerance) const {
+  const ColumnLayers layers(expected);
+  const int low = layers.lowest() - kReach, high = layers.highest() + kReach;
+  const auto from = [](const Feet& f, int layer) { return f.layer < layer; };
+  const auto begin = std::lower_bound(feet.begin(), feet.end(), low, from);
+  const std::span<const Feet> near(begin, std::lower_bound(begin, feet.end(), high, from));
+  std::array<std::uint64_t, kMostLayers> floor{};
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const int layer = near[k].layer;
+    floor[k] = near[k].columns & layers.between(layer - tolerance, layer + tolerance + 1);
+  }
+  go_on_column_by_column(near, floor);
+  Samples samples = samples_of(near, floor);
+  if (samples.count < support_) return std::nullopt;
+  // Twice: the second time without what stands on it or leans against it.
+  TilePlane plane = fit_plane(samples, expected.rise);
+  samples.drop(
+      [&](const Sample& s) { return std::abs(s.layer - plane.at(s.x, s.y)) > kOutlier_layers; });
+  if (samples.count < support_) return std::nullopt;
+  plane = fit_plane(samples, expected.rise);
+  if (plane.rise.norm() > max_slope_) return std::nullopt;
+  // A ramp shows its slope; what only lies near where it would go on is the foot of a wall.
+  const bool shown = samples.count >= kLeastForSlope || plane.rise.norm() < kLevel;
+  return shown ? std::optional(plane) : std::nullopt;
+}
+
+}  // namespace arex

@@ -40,7 +40,11 @@ inline std::uint64_t with_neighbours(std::uint64_t columns) {
   return columns | shift_up<1>(columns) | shift_down<1>(columns);
 }
 
-inline int x_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x15)); }
-inline int y_of(int bit) { return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x2a)); }
+inline int x_of(int bit) {
+  return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x15));
+}
+inline int y_of(int bit) {
+  return static_cast<int>(gather_bits(static_cast<std::uint64_t>(bit), 0x2a));
+}
 
 }  // namespace arex

@@ -26,11 +26,11 @@ TEST(Summary, HasNoFigureWhereThereWasNothingToMeasure) {
   result.outcome = Outcome::kTimedOut;
   result.reason = "no odometry";
   const std::set<std::string> expected{
-      "outcome",         "reason",        "scenario",        "seed",
-      "sim_time_s",      "wall_time_s",   "cpu_time_s",      "real_time_factor",
-      "trajectory_hash", "sensor_hash",   "distance_m",      "targets.count",
-      "odometry.source", "collisions",    "battery.used_wh", "battery.remaining_fraction",
-      "build.version",   "build.compiler", "faults.events", "yaw.spins",
+      "outcome",         "reason",           "scenario",        "seed",
+      "sim_time_s",      "wall_time_s",      "cpu_time_s",      "real_time_factor",
+      "trajectory_hash", "sensor_hash",      "distance_m",      "targets.count",
+      "odometry.source", "collisions",       "battery.used_wh", "battery.remaining_fraction",
+      "build.version",   "build.compiler",   "faults.events",   "yaw.spins",
       "yaw.turned_rad",  "yaw.fastest_radps"};
   result.trajectory_hash = result.sensor_hash = "0";
   Scenario scenario;

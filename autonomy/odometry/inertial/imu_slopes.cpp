@@ -52,9 +52,13 @@ void add_slopes(std::vector<ImuInterval>& intervals, std::span<const ImuSample> 
   const double gyro_std = share * scatter_of_integral(shaking.gyro);
   const double accel_std = share * scatter_of_integral(shaking.accel);
   const Vec3 gyro = sure_part((after.gyro - before.gyro) / seconds, gyro_std);
+  // What an error of scale does to a turn. By the readings themselves, which turn as they are
+  // shaken, the scale would be learned from the shaking: by a tenth wrong.
+  const double level_std = std::sqrt(2.0) / to_seconds(window) * scatter_of_integral(shaking.gyro);
+  const Vec3 level = sure_part(0.5 * (before.gyro + after.gyro), level_std);
   const Vec3 accel = accel_scale * sure_part((after.accel - before.accel) / seconds, accel_std);
   for (ImuInterval& imu : intervals) {
-    imu.gyro_level = after.gyro;
+    imu.gyro_level = level;
     imu.gyro_slope = gyro;
     imu.accel_slope = accel;
     imu.gyro_slope_noise.setConstant(std::sqrt(seconds) * gyro_std);

@@ -141,7 +141,7 @@ PropagationJacobians propagation_jacobians(const NavigationState& x, const ImuIn
   // How the turn answers to the gyro's errors. A later reading is another one by its slope.
   const Vec3 scale = Vec3::Ones() + x.s_g;
   const Mat3 turn_by_gyro_bias = -A_T_dt * scale.asDiagonal();
-  const Mat3 turn_by_gyro_scale = A_T_dt * (imu.mean_gyro() - x.b_g).asDiagonal();
+  const Mat3 turn_by_gyro_scale = A_T_dt * (imu.gyro_level - x.b_g).asDiagonal();
   const Vec3 turn_by_time = A_T_dt * scale.cwiseProduct(imu.gyro_slope);
   const Vec3 a_by_time = a_by_turn * turn_by_time - a_by_accel_bias * imu.accel_slope;
 

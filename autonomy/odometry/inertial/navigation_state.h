@@ -72,7 +72,7 @@ struct ImuInterval {
   Vec3 gyro_begin, gyro_end;        ///< rad/s
   Vec3 accel_begin, accel_end;      ///< m/s^2
   Vec3 field_begin = Vec3::Zero();  ///< magnetic, gauss; zero: not measured
-  Vec3 gyro_level = Vec3::Zero();   ///< mean of the readings over all intervals at once, rad/s
+  Vec3 gyro_level = Vec3::Zero();   ///< of all intervals at once, without what may be noise, rad/s
   Vec3 gyro_slope = Vec3::Zero();   ///< of the readings over all intervals at once, rad/s^2
   Vec3 accel_slope = Vec3::Zero();  ///< m/s^3
   /// White noise that has the effect of what is unknown of the slopes, per second of delay.

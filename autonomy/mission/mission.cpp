@@ -167,7 +167,8 @@ void Mission::watch_sight(const Inputs& inputs) {
     events_(EventKind::kRecovery, "lidar is back: goes on");
     blind_ = false;
     resume(inputs);
-  } else if (blind_ && state_ == MissionState::kHold && inputs.blind_s >= config_.blind_land_s) {
+  } else if (blind_ && state_ == MissionState::kHold && inputs.lives_on_scans &&
+             inputs.blind_s >= config_.blind_land_s) {
     events_(EventKind::kRecovery, "lidar silent: lands");
     end_stuck("lidar silent");
     lands_blind_ = true;

@@ -111,7 +111,8 @@ struct MissionConfig {
     f("lost_hover_s", lost_hover_s,
       "level at hover thrust without odometry, then the autopilot lands");
     f("blind_hold_s", blind_hold_s, "without a LiDAR scan for so long it comes to rest and waits");
-    f("blind_land_s", blind_land_s, "after so long it lands");
+    f("blind_land_s", blind_land_s,
+      "after so long it lands, if its odometry lives on scans; on its eyes it goes on waiting");
     f("landing", landing, "where it may come down");
     f.check(yaw_burst_s >= 0.001, "yaw_burst_s >= 0.001 (a tick)");
     f.check(lost_hover_s >= 0, "lost_hover_s >= 0");
@@ -175,9 +176,10 @@ class Mission {
     std::string_view cause;                               ///< why it failed
     bool leg_blocked = false;                             ///< something stands in the way of a kLeg
     LandingGround below = LandingGround::kUnknown;        ///< where it would come down
-    bool at_reserve = false;   ///< of the battery: what is left is needed to land
-    std::string_view trouble;  ///< the newest fault of sensors or vehicle that is not over
-    double blind_s = 0;        ///< since the LiDAR's newest scan
+    bool at_reserve = false;     ///< of the battery: what is left is needed to land
+    std::string_view trouble;    ///< the newest fault of sensors or vehicle that is not over
+    double blind_s = 0;          ///< since the LiDAR's newest scan
+    bool lives_on_scans = true;  ///< the odometry that flies: without any it will be lost
   };
   /// Advances by one control step.
   MotionRequest update(const Inputs& inputs);

@@ -262,11 +262,11 @@ std::optional<AttitudeCommand> Stack::tick() {
   seek_landing();
   // The navigator's word counts for the request that it serves, not for one it has not seen yet.
   const bool serves = navigating_ && navigator_.request() == mission_.request();
-  request_ =
-      mission_.update({now_, checked_odometry(), odometry_need(), autopilot_.ready,
-                       autopilot_.armed, serves ? navigator_.progress() : MotionProgress::kUnderWay,
-                       navigator_.cause(), !navigating_ && legs_.blocked(), ground_below(),
-                       at_reserve(), trouble_, lidar_watch_.silent_s(now_)});
+  request_ = mission_.update(
+      {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
+       serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
+       !navigating_ && legs_.blocked(), ground_below(), at_reserve(), trouble_,
+       lidar_watch_.silent_s(now_), flying().odometry->places_scans()});
   setpoint_ = move(request_);
   return control(request_);
 }

@@ -138,7 +138,8 @@ TEST(RegisterScan, FindsThePoseInACorner) {
 
 TEST(RegisterScan, NamesTheDirectionsThatOneWallLeavesOpen) {
   const Corner wall(false);
-  const LidarInertialConfig config;
+  LidarInertialConfig config;
+  config.registration.variance_inflation = 9;  // what the normals feign goes down with it
   ErrorStateFilter filter(config.imu);
   filter.reset(NavigationState{}, pose_doubt());
   const RegistrationReport report = register_scan(wall.points, wall.map, config, 0, filter);
@@ -146,7 +147,7 @@ TEST(RegisterScan, NamesTheDirectionsThatOneWallLeavesOpen) {
   EXPECT_LT(std::abs(report.worst_position_axis_O.z()), 0.05);
   EXPECT_GT(std::abs(report.worst_rotation_axis_B.z()), 0.95);
   // And the filter knows; the scatter of the fitted normals feigns a little.
-  EXPECT_GT(filter.covariance()(kPosition, kPosition), 0.4e-2);
+  EXPECT_GT(filter.covariance()(kPosition, kPosition), 0.5e-2);
   EXPECT_LT(filter.covariance()(kPosition + 2, kPosition + 2), 1e-5);
 }
 

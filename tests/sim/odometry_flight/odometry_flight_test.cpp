@@ -59,8 +59,7 @@ TEST(OdometryFlight, GoesDownTheRampAndAlongTheGarage) {
   // milliradian, 90 m away. The shape of the flight knows nothing of it.
   EXPECT_LT(score.ate_rmse_m, 0.08);
   EXPECT_LT(score.ate_se3_rmse_m, 0.012);
-  // The gyro is shaken by a milliradian RMS, and its delay known to some: 5 mrad in a turn.
-  EXPECT_LT(score.yaw_error_max_deg, 0.6);
+  EXPECT_LT(score.yaw_error_max_deg, 0.4);
   EXPECT_FALSE(flown.told("sensor_fault"));
 }
 

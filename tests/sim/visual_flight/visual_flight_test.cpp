@@ -68,10 +68,9 @@ TEST(VisualFlight, DriftsBesideALidarThatDoesNot) {
 
 // The LiDAR is silent for 20 s in the middle of an exploration, which waits for it on its eyes.
 TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
-  const Flown flown =
-      fly("forest_small",
-          {"odometry.failover=[lidar_inertial, visual_inertial]", "lidar.fault_silent_from_s=20",
-           "lidar.fault_silent_for_s=20", "mission.blind_land_s=25", "mission.max_time_s=44"});
+  const Flown flown = fly("forest_small", {"odometry.failover=[lidar_inertial, visual_inertial]",
+                                           "lidar.fault_silent_from_s=20",
+                                           "lidar.fault_silent_for_s=20", "mission.max_time_s=60"});
   EXPECT_EQ(flown.result.outcome, Outcome::kTimedOut) << flown.result.reason;
   EXPECT_EQ(flown.result.flight.odometry_lost_s, 0);
   EXPECT_NE(flown.events.find("odometry visual_inertial takes over from lidar_inertial"),

@@ -27,7 +27,9 @@ Odometry LidarInertialOdometry::add_imu(const ImuSample& imu) {
 }
 
 ScanJob LidarInertialOdometry::prepare(const LidarScanPtr& scan) {
-  return {scan, std::exchange(unhanded_, {}), full_scale_.radps()};
+  std::optional<Odometry> suggested = std::exchange(suggested_, {});
+  if (odometry_.status != OdometryStatus::kLost) suggested.reset();
+  return {scan, std::exchange(unhanded_, {}), full_scale_.radps(), suggested};
 }
 
 void LidarInertialOdometry::apply(const ScanUpdate& update) {

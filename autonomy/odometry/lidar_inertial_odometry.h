@@ -40,6 +40,9 @@ class LidarInertialOdometry {
   /// Anchors the output at the update and integrates the later samples again.
   void apply(const ScanUpdate& update);
 
+  /// Where another has the vehicle, in O: the next scan is looked for there, if this one is lost.
+  void suggest(const Odometry& odometry) { suggested_ = odometry; }
+
   /// The three steps at once.
   ScanUpdate add_scan(const LidarScanPtr& scan);
 
@@ -62,6 +65,7 @@ class LidarInertialOdometry {
   GyroFullScale full_scale_;
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet, at their true times
   ImuSample newest_;
+  std::optional<Odometry> suggested_;
   PoseCovariance corrected_ = PoseCovariance::Zero();  ///< at the newest update
   Mat3 corrected_velocity_ = Mat3::Zero();             ///< covariance likewise
   WhiteNoise imu_noise_;

@@ -21,6 +21,7 @@ class LidarInertialSource : public OdometrySource {
 
   void add_imu(const ImuSample& imu) override { poses_.add(odometry_.add_imu(imu)); }
   std::optional<Job> add_scan(const LidarScanPtr& scan) override;
+  void suggest(const Odometry& odometry) override { odometry_.suggest(odometry); }
 
   [[nodiscard]] const Odometry& odometry() const override { return odometry_.odometry(); }
   [[nodiscard]] OdometryNeed need() const override { return odometry_.need(); }

@@ -32,6 +32,9 @@ class OdometrySource {
   virtual std::optional<Job> add_scan(const LidarScanPtr& /*scan*/) { return std::nullopt; }
   virtual std::optional<Job> add_images(const StereoImagePtr& /*images*/) { return std::nullopt; }
   virtual void add_mocap(const MocapSample& /*mocap*/) {}
+  /// Where another source has the vehicle, in this one's O: where to look for itself when it is
+  /// lost.
+  virtual void suggest(const Odometry& /*odometry*/) {}
 
   /// The newest estimate, 200 Hz; kInitialising before the first.
   [[nodiscard]] virtual const Odometry& odometry() const = 0;

@@ -64,6 +64,9 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   update.begin = job.scan->stamp;
   update.end = job.scan->end;
   if (stood_at_ && has_imu_gap(imu_.between(stamp_, update.end), update.end)) start_again();
+  if (job.suggested && !stood_at_ && status_ != OdometryStatus::kInitialising) {
+    move_to(*job.suggested, update.begin);
+  }
   if (status_ == OdometryStatus::kInitialising) {
     try_start(job.scan);
     update.points_O = std::make_shared<const std::vector<Vec3f>>();
@@ -104,6 +107,17 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
   update.accel_scale = accel_scale_;
   update.gyro = gyro_;
   return update;
+}
+
+void ScanCorrector::move_to(const Odometry& suggested, Stamp scan_begin) {
+  NavigationState x = filter_.state();
+  x.R_OB = suggested.X_OB.R;
+  x.v_OB = suggested.v_OB;
+  x.p_OB = suggested.X_OB.p - to_seconds(suggested.stamp - scan_begin) * x.v_OB;
+  filter_.reset(x, filter_.covariance());
+  corrected_position_ = x.p_OB;
+  stamp_ = scan_begin;
+  status_ = OdometryStatus::kLost;
 }
 
 void ScanCorrector::try_start(const LidarScanPtr& scan) {

@@ -17,7 +17,8 @@ namespace arex {
 struct ScanJob {
   LidarScanPtr scan;
   std::vector<ImuSample> imu;
-  double gyro_full_scale_radps = 0;  ///< as far as it is known
+  double gyro_full_scale_radps = 0;   ///< as far as it is known
+  std::optional<Odometry> suggested;  ///< of a lost odometry: where it may be, in O
 };
 
 using PointsPtr = std::shared_ptr<const std::vector<Vec3f>>;
@@ -57,6 +58,8 @@ class ScanCorrector {
 
  private:
   void try_start(const LidarScanPtr& scan);
+  /// Is lost at another's place: what the IMU says since the last correction is forgotten.
+  void move_to(const Odometry& suggested, Stamp scan_begin);
   /// Places O and makes the first map of the standing scans. @return whether the newest of them can
   /// be registered against it; otherwise the map is empty again.
   bool start(const StaticStart& standing, Stamp stamp);

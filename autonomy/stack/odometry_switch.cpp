@@ -101,4 +101,12 @@ Odometry OdometrySwitch::in_common_frame(const Odometry& odometry) {
   return common_;
 }
 
+Odometry OdometrySwitch::in_frame_of(std::size_t source) const {
+  const Offset& frame = frames_[source];
+  Offset back;
+  back.yaw_rad = -frame.yaw_rad;
+  back.shift_m = -(so3::from_yaw(back.yaw_rad) * frame.shift_m);
+  return moved(common_, back);
+}
+
 }  // namespace arex

@@ -48,6 +48,8 @@ class OdometrySwitch {
   /// The flying source's estimate in the frame that the vehicle flies in. To be called once for
   /// each new estimate, in order.
   [[nodiscard]] Odometry in_common_frame(const Odometry& odometry);
+  /// The newest one that was given out, in the frame of a source.
+  [[nodiscard]] Odometry in_frame_of(std::size_t source) const;
 
  private:
   /// A turn about the vertical, then a shift.

@@ -150,7 +150,11 @@ void Stack::add_scan(const LidarScanPtr& scan) {
   last_scan_ = scan;
   if (repeats) return;
   lidar_watch_.add_scan(now_, *scan);
-  for (Source& source : sources_) start(source, source.odometry->add_scan(scan));
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    Source& source = sources_[i];
+    if (i < may_fly_ && i != switch_.flying()) source.odometry->suggest(switch_.in_frame_of(i));
+    start(source, source.odometry->add_scan(scan));
+  }
   if (!flying().odometry->places_scans()) perception_.add_scan(now_, *scan);
 }
 

@@ -112,6 +112,28 @@ TEST(OdometrySwitch, TurnsTheCovarianceWithTheFrame) {
   EXPECT_NEAR(P(0, 0), 1, 1e-9);
 }
 
+// Where a lost source is to look for itself: where it would have the vehicle, were it sound.
+TEST(OdometrySwitch, TellsEachSourceWhereItWouldBe) {
+  const Source first, second{0.4, {3, -2, 0.5}, Vec3::Zero()};
+  constexpr double kRest = 1e-3;  // m, rad: of the change of source, still being taken back
+  OdometrySwitch sources({}, 2);
+  for (Stamp now = kStep; now < from_seconds(10); now += kStep) {
+    const bool lost = now > from_seconds(5);
+    const Odometry a = first.at(now, lost ? OdometryStatus::kLost : OdometryStatus::kOk);
+    const Odometry b = second.at(now);
+    static_cast<void>(sources.update({&a, &b}));
+    static_cast<void>(sources.in_common_frame(sources.flying() == 0 ? a : b));
+    const Pose off_a = first.at(now).X_OB.inverse() * sources.in_frame_of(0).X_OB;
+    EXPECT_LT(off_a.p.norm(), kRest);
+    EXPECT_LT(so3::angle(off_a.R), kRest);
+    if (now == kStep) continue;  // its frame is laid over the flying one's by now
+    const Pose off_b = second.at(now).X_OB.inverse() * sources.in_frame_of(1).X_OB;
+    EXPECT_LT(off_b.p.norm(), kRest);
+    EXPECT_LT(so3::angle(off_b.R), kRest);
+  }
+  EXPECT_EQ(sources.flying(), 1U);
+}
+
 TEST(OdometrySwitch, StaysWhereNoneIsBetter) {
   OdometrySwitch sources({}, 2);
   const Source source;

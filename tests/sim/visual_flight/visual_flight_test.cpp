@@ -75,6 +75,8 @@ TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
   EXPECT_EQ(flown.result.flight.odometry_lost_s, 0);
   EXPECT_NE(flown.events.find("odometry visual_inertial takes over from lidar_inertial"),
             std::string::npos);
+  EXPECT_NE(flown.events.find("odometry lidar_inertial takes over from visual_inertial"),
+            std::string::npos);
   EXPECT_EQ(flown.events.find("mission_state,lost"), std::string::npos);
   EXPECT_LT(flown.result.flight.odometry.ate_max_m, 0.5);
 }

@@ -438,6 +438,16 @@ TEST(LidarInertialOdometry, CarriesOnAndSaysSoWhileTheGyroIsClipped) {
   }
 }
 
+/// The interval `k` of a gyro that turns about z from one rate to another, as it reads them.
+ImuInterval clipped_yaw(int k, double begin_radps, double end_radps, double full_scale_radps) {
+  ImuInterval imu;
+  imu.gyro_begin = Vec3(0, 0, std::clamp(begin_radps, -full_scale_radps, full_scale_radps));
+  imu.gyro_end = Vec3(0, 0, std::clamp(end_radps, -full_scale_radps, full_scale_radps));
+  imu.begin = k * kPeriod;
+  imu.end = (k + 1) * kPeriod;
+  return imu;
+}
+
 // A ramp to a rate beyond full scale, as a drive turns a vehicle: until a scan tells, what is
 // missing is no further off than half of what an unfinished reading would lack.
 TEST(GyroCompletion, TakesTheTurnToGoOnAsItCame) {
@@ -448,12 +458,7 @@ TEST(GyroCompletion, TakesTheTurnToGoOnAsItCame) {
     completion.full_scale_radps = kFullScale;
     double missed_rad = 0, read_rad = 0;
     for (int k = 0; k < 120; ++k) {
-      ImuInterval imu;
-      imu.gyro_begin = imu.gyro_end = Vec3::Zero();
-      imu.begin = k * kPeriod;
-      imu.end = (k + 1) * kPeriod;
-      imu.gyro_begin.z() = std::clamp(rate(k), -kFullScale, kFullScale);
-      imu.gyro_end.z() = std::clamp(rate(k + 1), -kFullScale, kFullScale);
+      ImuInterval imu = clipped_yaw(k, rate(k), rate(k + 1), kFullScale);
       const double truth = 0.5 * (rate(k) + rate(k + 1));
       read_rad += 5e-3 * std::abs(truth - imu.mean_gyro().z());
       completion.complete(imu);
@@ -483,12 +488,7 @@ TEST(GyroCompletion, FollowsTheEarthsField) {
     completion.field_O = field_O + hard_iron;
     double truth = 0, estimate = 0, worst = 0;
     for (int k = 0; k < 300; ++k) {
-      ImuInterval imu;
-      imu.gyro_begin = imu.gyro_end = Vec3::Zero();
-      imu.begin = k * kPeriod;
-      imu.end = (k + 1) * kPeriod;
-      imu.gyro_begin.z() = std::clamp(rate(k), -kFullScale, kFullScale);
-      imu.gyro_end.z() = std::clamp(rate(k + 1), -kFullScale, kFullScale);
+      ImuInterval imu = clipped_yaw(k, rate(k), rate(k + 1), kFullScale);
       imu.field_begin =
           so3::from_yaw(truth).transpose() * field_O + hard_iron + 0.004 * random.normal3();
       completion.complete(imu, so3::from_yaw(estimate));

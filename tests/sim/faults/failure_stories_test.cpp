@@ -4,39 +4,19 @@
 #include <utility>
 #include <vector>
 
-#include "run/simulation.h"
-#include "support/temporary_folder.h"
+#include "support/flown.h"
 
 namespace arex::sim {
 namespace {
 
-/// A flight, and what was told meanwhile.
-struct Flown {
-  FlightResult result;
-  std::string events;  ///< "kind,detail;" of each
-
-  [[nodiscard]] bool told(const std::string& what) const {
-    return events.find(what) != std::string::npos;
-  }
+struct Flown : test::Flown {
   [[nodiscard]] bool told_a_fault() const {
     return told("sensor_fault,") || told("vehicle_fault,") || told("vibration,");
   }
 };
 
 Flown fly(const Scenario& scenario) {
-  const test::TemporaryFolder folder;
-  Flown flown;
-  {
-    Recorder recorder(folder.path(), "");
-    Simulation simulation(scenario, 2);
-    simulation.record_to(recorder);
-    while (simulation.tick()) {
-    }
-    flown.result = simulation.finish();
-    recorder.flush();
-  }
-  flown.events = test::read_text(folder / "events.csv");
-  return flown;
+  return {test::fly(scenario, 2, [](const Simulation&) {})};
 }
 
 Flown fly(const std::string& text, const std::vector<std::string>& overrides,

@@ -1,47 +1,28 @@
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <string>
+#include <vector>
 
-#include "run/simulation.h"
+#include "support/flown.h"
 
 namespace arex::sim {
 namespace {
 
-/// The flight on its own odometry, and what it told meanwhile.
-struct Flown {
-  FlightResult result;
-  std::string events;       ///< events.csv
+/// The flight on its own odometry.
+struct Flown : test::Flown {
   double degenerate_s = 0;  ///< in the air
-
-  [[nodiscard]] bool told(const std::string& what) const {
-    return events.find(what) != std::string::npos;
-  }
 };
 
 Flown fly(const std::string& scenario, std::vector<std::string> overrides) {
   overrides.emplace_back("mapping.use_depth=false");
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) /
-      testing::UnitTest::GetInstance()->current_test_info()->name();
-  Flown flown;
-  {
-    Recorder recorder(folder, "");
-    Simulation simulation(
-        load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 1);
-    simulation.record_to(recorder);
-    while (simulation.tick()) {
-      const bool degenerate = simulation.view().odometry.status == OdometryStatus::kDegenerate;
-      if (degenerate) flown.degenerate_s += to_seconds(kNanosecondsPerTick);
-    }
-    flown.result = simulation.finish();
-    recorder.flush();
-  }
-  std::ostringstream text;
-  text << std::ifstream(folder / "events.csv").rdbuf();
-  flown.events = text.str();
-  return flown;
+  double degenerate_s = 0;
+  const auto look = [&](const Simulation& simulation) {
+    const bool degenerate = simulation.view().odometry.status == OdometryStatus::kDegenerate;
+    if (degenerate) degenerate_s += to_seconds(kNanosecondsPerTick);
+  };
+  const test::Flown flown = test::fly(
+      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 1, look);
+  return {flown, degenerate_s};
 }
 
 void expect_arrival(const FlightResult& result) {

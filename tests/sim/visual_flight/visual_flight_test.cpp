@@ -1,51 +1,43 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <numbers>
+#include <string>
+#include <vector>
 
-#include "run/simulation.h"
+#include "math/so3.h"
+#include "support/flown.h"
 
 namespace arex::sim {
 namespace {
 
-struct Flown {
-  FlightResult result;
-  std::string events;         ///< events.csv
-  double largest_step_m = 0;  ///< of what the controller sees, beyond its velocity, from take-off
-  double largest_turn_rad = 0;
+struct Flown : test::Flown {
+  double step_m = 0;  ///< largest of what the controller sees, beyond its velocity, where the
+                      ///< source changes
+  double turn_rad = 0;
 };
 
 Flown fly(const std::string& scenario, const std::vector<std::string>& overrides) {
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) /
-      testing::UnitTest::GetInstance()->current_test_info()->name();
-  Flown flown;
-  Recorder recorder(folder, "");
-  Simulation simulation(
-      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 2);
-  simulation.record_to(recorder);
+  double step_m = 0, turn_rad = 0;
   Odometry before;
-  while (simulation.tick()) {
+  std::string beside;  // of the sources, the first that does not fly
+  const auto look = [&](const Simulation& simulation) {
     const FlightView view = simulation.view();
     const Odometry& now = view.odometry;
-    if (now.stamp > before.stamp && before.status != OdometryStatus::kInitialising) {
+    if (now.stamp <= before.stamp) return;
+    const std::string beside_now(view.others.empty() ? "" : view.others.front().name);
+    if (before.stamp > 0 && beside_now != beside) {
       const double dt = to_seconds(now.stamp - before.stamp);
-      flown.largest_step_m =
-          std::max(flown.largest_step_m, (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm());
       const Mat3 turned = before.X_OB.R * so3::Exp(dt * before.w_OB_B);
-      flown.largest_turn_rad =
-          std::max(flown.largest_turn_rad, so3::angle(turned.transpose() * now.X_OB.R));
+      step_m = std::max(step_m, (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm());
+      turn_rad = std::max(turn_rad, so3::angle(turned.transpose() * now.X_OB.R));
     }
+    beside = beside_now;
     before = now;
-  }
-  flown.result = simulation.finish();
-  recorder.flush();
-  std::ostringstream text;
-  text << std::ifstream(folder / "events.csv").rdbuf();
-  flown.events = text.str();
-  return flown;
+  };
+  const test::Flown flown = test::fly(
+      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 2, look);
+  return {flown, step_m, turn_rad};
 }
 
 // The paper's story, its first two waypoints: both begin together, the LiDAR stays, the eyes drift.
@@ -73,11 +65,12 @@ TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
                                            "lidar.fault_silent_for_s=20", "mission.max_time_s=60"});
   EXPECT_EQ(flown.result.outcome, Outcome::kTimedOut) << flown.result.reason;
   EXPECT_EQ(flown.result.flight.odometry_lost_s, 0);
-  EXPECT_NE(flown.events.find("odometry visual_inertial takes over from lidar_inertial"),
-            std::string::npos);
-  EXPECT_NE(flown.events.find("odometry lidar_inertial takes over from visual_inertial"),
-            std::string::npos);
-  EXPECT_EQ(flown.events.find("mission_state,lost"), std::string::npos);
+  EXPECT_TRUE(flown.told("odometry visual_inertial takes over from lidar_inertial"));
+  EXPECT_TRUE(flown.told("odometry lidar_inertial takes over from visual_inertial"));
+  EXPECT_GT(flown.step_m, 0);
+  EXPECT_LT(flown.step_m, 0.03);
+  EXPECT_LT(flown.turn_rad, 0.3 * std::numbers::pi / 180);
+  EXPECT_FALSE(flown.told("mission_state,lost"));
   EXPECT_LT(flown.result.flight.odometry.ate_max_m, 0.5);
 }
 
@@ -86,9 +79,8 @@ TEST(VisualFlight, SaysThatItSeesNothingInTheDark) {
   const Flown flown =
       fly("garage_waypoints", {"odometries={vio: {type: visual_inertial}}",
                                "infrared.light.lamps=false", "mission.max_time_s=55"});
-  EXPECT_NE(flown.events.find("sensor_fault,visual odometry degenerate: few tracks"),
-            std::string::npos);
-  EXPECT_NE(flown.events.find("sensor_fault,visual odometry lost"), std::string::npos);
+  EXPECT_TRUE(flown.told("sensor_fault,visual odometry degenerate: few tracks"));
+  EXPECT_TRUE(flown.told("sensor_fault,visual odometry lost"));
   EXPECT_GT(flown.result.flight.others.at("vio").lost_s, 1);
 }
 

@@ -175,5 +175,39 @@ TEST(ReadingFaults, LightBlindsItsShareOfAnImage) {
   }
 }
 
+TEST(ReadingFaults, LightDrownsBlocksOfAnEyeAndNoiseScattersItsPixels) {
+  auto image = std::make_shared<StereoImage>();
+  image->width = 320;
+  image->height = 240;
+  image->left.assign(320 * 240, 100);
+  RandomStream random(1, "eye");
+  FaultConfig fault = fault_of("infrared", FaultKind::kBlinded);
+  fault.share = 0.3;
+  double white = 0;
+  for (int i = 0; i < 20; ++i) {
+    const StereoImagePtr blind = spoilt(StereoImagePtr(image), fault, random);
+    EXPECT_TRUE(blind->right.empty());  // as it was
+    for (const std::uint8_t level : blind->left) white += level == 255;
+  }
+  EXPECT_NEAR(white / (20.0 * 320 * 240), 0.3, 0.03);  // of 300 blocks, 20 times
+
+  fault = fault_of("infrared", FaultKind::kNoisy);
+  const StereoImagePtr noisy = spoilt(StereoImagePtr(image), fault, random);
+  double sum = 0, squares = 0;
+  for (const std::uint8_t level : noisy->left) {
+    sum += level - 100.0;
+    squares += std::pow(level - 100.0, 2);
+  }
+  const double n = 320 * 240;
+  EXPECT_NEAR(sum / n, 0, 0.4);
+  EXPECT_NEAR(std::sqrt(squares / n), fault.image_noise_levels, 0.3);
+
+  auto later = std::make_shared<StereoImage>();
+  later->time_ns = 7;
+  const StereoImagePtr stuck = with_stamps_of(StereoImagePtr(later), StereoImagePtr(image));
+  EXPECT_EQ(stuck->time_ns, 7);
+  EXPECT_EQ(stuck->left, image->left);
+}
+
 }  // namespace
 }  // namespace arex::sim

@@ -6,8 +6,8 @@
 namespace arex {
 namespace {
 
-// Rows of the IMU's residual.
-constexpr int kTurn = 0, kSpeed = 3, kWay = 6, kGyroWalk = 9, kAccelWalk = 12;
+// Rows of the IMU's residual below those of the preintegration's error.
+constexpr int kImuGyroWalk = 9, kImuAccelWalk = 12;
 // Nearer than this share of its distance to the camera's plane, a point is behind it.
 constexpr double kLeastForward = 0.05;
 
@@ -23,8 +23,8 @@ Corrected corrected(const Preintegration& imu, const FrameState& from) {
   Eigen::Matrix<double, 6, 1> db;
   db << from.b_g - imu.b_g(), from.b_a - imu.b_a();
   const Eigen::Matrix<double, 9, 1> d = imu.bias_jacobian() * db;
-  return {imu.dR() * so3::Exp(d.segment<3>(kTurn)), imu.dv() + d.segment<3>(kSpeed),
-          imu.dp() + d.segment<3>(kWay), d.segment<3>(kTurn)};
+  return {imu.dR() * so3::Exp(d.segment<3>(kImuTurn)), imu.dv() + d.segment<3>(kImuSpeed),
+          imu.dp() + d.segment<3>(kImuWay), d.segment<3>(kImuTurn)};
 }
 
 /// A landmark on its way from the anchor's ray to an eye, all times its inverse depth, so that a
@@ -56,12 +56,12 @@ ImuResidual imu_residual(const Preintegration& imu, const FrameState& from, cons
   const Corrected c = corrected(imu, from);
   const Mat3 to_body = from.R_OB.transpose();
   ImuResidual r;
-  r.segment<3>(kTurn) = so3::Log(c.dR.transpose() * to_body * to.R_OB);
-  r.segment<3>(kSpeed) = to_body * (to.v_OB - from.v_OB - dt * gravity()) - c.dv;
-  r.segment<3>(kWay) =
+  r.segment<3>(kImuTurn) = so3::Log(c.dR.transpose() * to_body * to.R_OB);
+  r.segment<3>(kImuSpeed) = to_body * (to.v_OB - from.v_OB - dt * gravity()) - c.dv;
+  r.segment<3>(kImuWay) =
       to_body * (to.p_OB - from.p_OB - dt * from.v_OB - 0.5 * dt * dt * gravity()) - c.dp;
-  r.segment<3>(kGyroWalk) = to.b_g - from.b_g;
-  r.segment<3>(kAccelWalk) = to.b_a - from.b_a;
+  r.segment<3>(kImuGyroWalk) = to.b_g - from.b_g;
+  r.segment<3>(kImuAccelWalk) = to.b_a - from.b_a;
   return r;
 }
 
@@ -75,25 +75,26 @@ ImuJacobians imu_jacobians(const Preintegration& imu, const FrameState& from,
   const Mat3 inverse = so3::right_jacobian_inverse(r);
   ImuJacobians out{ImuJacobian::Zero(), ImuJacobian::Zero()};
 
-  out.from.block<3, 3>(kTurn, kRotation) = -inverse * to.R_OB.transpose() * from.R_OB;
-  out.from.block<3, 3>(kTurn, kGyroBias) =
-      -inverse * so3::Exp(-r) * so3::right_jacobian(c.turn) * J.block<3, 3>(kTurn, 0);
-  out.to.block<3, 3>(kTurn, kRotation) = inverse;
+  out.from.block<3, 3>(kImuTurn, kRotation) = -inverse * to.R_OB.transpose() * from.R_OB;
+  out.from.block<3, 3>(kImuTurn, kGyroBias) =
+      -inverse * so3::Exp(-r) * so3::right_jacobian(c.turn) * J.block<3, 3>(kImuTurn, 0);
+  out.to.block<3, 3>(kImuTurn, kRotation) = inverse;
 
-  out.from.block<3, 3>(kSpeed, kRotation) =
+  out.from.block<3, 3>(kImuSpeed, kRotation) =
       so3::hat(to_body * (to.v_OB - from.v_OB - dt * gravity()));
-  out.from.block<3, 3>(kSpeed, kVelocity) = -to_body;
-  out.from.block<3, 6>(kSpeed, kGyroBias) = -J.block<3, 6>(kSpeed, 0);
-  out.to.block<3, 3>(kSpeed, kVelocity) = to_body;
+  out.from.block<3, 3>(kImuSpeed, kVelocity) = -to_body;
+  out.from.block<3, 6>(kImuSpeed, kGyroBias) = -J.block<3, 6>(kImuSpeed, 0);
+  out.to.block<3, 3>(kImuSpeed, kVelocity) = to_body;
 
-  out.from.block<3, 3>(kWay, kRotation) =
+  out.from.block<3, 3>(kImuWay, kRotation) =
       so3::hat(to_body * (to.p_OB - from.p_OB - dt * from.v_OB - 0.5 * dt * dt * gravity()));
-  out.from.block<3, 3>(kWay, kPosition) = -to_body;
-  out.from.block<3, 3>(kWay, kVelocity) = -dt * to_body;
-  out.from.block<3, 6>(kWay, kGyroBias) = -J.block<3, 6>(kWay, 0);
-  out.to.block<3, 3>(kWay, kPosition) = to_body;
+  out.from.block<3, 3>(kImuWay, kPosition) = -to_body;
+  out.from.block<3, 3>(kImuWay, kVelocity) = -dt * to_body;
+  out.from.block<3, 6>(kImuWay, kGyroBias) = -J.block<3, 6>(kImuWay, 0);
+  out.to.block<3, 3>(kImuWay, kPosition) = to_body;
 
-  for (const auto& [row, column] : {std::pair{kGyroWalk, +kGyroBias}, {kAccelWalk, +kAccelBias}}) {
+  for (const auto& [row, column] :
+       {std::pair{kImuGyroWalk, +kGyroBias}, {kImuAccelWalk, +kAccelBias}}) {
     out.from.block<3, 3>(row, column) = -Mat3::Identity();
     out.to.block<3, 3>(row, column) = Mat3::Identity();
   }
@@ -111,10 +112,11 @@ ImuJacobian imu_whitening(const Preintegration& imu) {
   W.topLeftCorner<9, 9>() =
       L.triangularView<Eigen::Lower>().solve(Preintegration::Covariance::Identity());
   const double root_s = std::sqrt(std::max(imu.dt_s(), 1e-6));
-  W.diagonal().segment<3>(kGyroWalk).setConstant(
-      1 / std::max(imu.noise().gyro_walk_density * root_s, 1e-9));
   W.diagonal()
-      .segment<3>(kAccelWalk)
+      .segment<3>(kImuGyroWalk)
+      .setConstant(1 / std::max(imu.noise().gyro_walk_density * root_s, 1e-9));
+  W.diagonal()
+      .segment<3>(kImuAccelWalk)
       .setConstant(1 / std::max(imu.noise().accel_walk_density * root_s, 1e-9));
   return W;
 }

@@ -6,12 +6,6 @@
 #include "math/so3.h"
 
 namespace arex {
-namespace {
-
-constexpr int kTurn = 0, kSpeed = 3, kWay = 6;  // blocks of the error
-
-}  // namespace
-
 void Preintegration::add(const ImuInterval& imu) {
   const double h = imu.dt_s();
   if (h <= 0) return;
@@ -29,17 +23,17 @@ void Preintegration::add(const ImuInterval& imu) {
   const Mat3 a_by_gyro = a_by_end_turn * turn_by_gyro;
 
   Covariance F = Covariance::Identity();
-  F.block<3, 3>(kTurn, kTurn) = E.transpose();
-  F.block<3, 3>(kSpeed, kTurn) = h * a_by_turn;
-  F.block<3, 3>(kWay, kTurn) = 0.5 * h * h * a_by_turn;
-  F.block<3, 3>(kWay, kSpeed) = h * Mat3::Identity();
+  F.block<3, 3>(kImuTurn, kImuTurn) = E.transpose();
+  F.block<3, 3>(kImuSpeed, kImuTurn) = h * a_by_turn;
+  F.block<3, 3>(kImuWay, kImuTurn) = 0.5 * h * h * a_by_turn;
+  F.block<3, 3>(kImuWay, kImuSpeed) = h * Mat3::Identity();
   BiasJacobian B;  // a reading errs as a bias would, for one interval
-  B.block<3, 3>(kTurn, 0) = turn_by_gyro;
-  B.block<3, 3>(kSpeed, 0) = h * a_by_gyro;
-  B.block<3, 3>(kWay, 0) = 0.5 * h * h * a_by_gyro;
-  B.block<3, 3>(kTurn, 3).setZero();
-  B.block<3, 3>(kSpeed, 3) = h * a_by_accel;
-  B.block<3, 3>(kWay, 3) = 0.5 * h * h * a_by_accel;
+  B.block<3, 3>(kImuTurn, 0) = turn_by_gyro;
+  B.block<3, 3>(kImuSpeed, 0) = h * a_by_gyro;
+  B.block<3, 3>(kImuWay, 0) = 0.5 * h * h * a_by_gyro;
+  B.block<3, 3>(kImuTurn, 3).setZero();
+  B.block<3, 3>(kImuSpeed, 3) = h * a_by_accel;
+  B.block<3, 3>(kImuWay, 3) = 0.5 * h * h * a_by_accel;
 
   Eigen::Matrix<double, 6, 1> variance;  // of the interval's mean readings
   for (int axis = 0; axis < 3; ++axis) {
@@ -70,8 +64,8 @@ void Preintegration::note_shaking(double angle_std_rad, double speed_std_mps) {
 
 Preintegration::Covariance Preintegration::covariance() const {
   Covariance P = P_;
-  P.diagonal().segment<3>(kTurn).array() += 2 * shaken_rad_ * shaken_rad_;
-  P.diagonal().segment<3>(kSpeed).array() += 2 * shaken_mps_ * shaken_mps_;
+  P.diagonal().segment<3>(kImuTurn).array() += 2 * shaken_rad_ * shaken_rad_;
+  P.diagonal().segment<3>(kImuSpeed).array() += 2 * shaken_mps_ * shaken_mps_;
   return P;
 }
 

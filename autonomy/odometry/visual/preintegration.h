@@ -8,6 +8,9 @@
 
 namespace arex {
 
+/// Rows of a preintegration's error: rotation, velocity, position.
+inline constexpr int kImuTurn = 0, kImuSpeed = 3, kImuWay = 6;
+
 /// What the IMU says of the motion between two frames, whatever the state at the first: turn,
 /// change of velocity and of position in the body's frame there, gravity left out.
 ///

@@ -8,7 +8,6 @@
 namespace arex {
 namespace {
 
-constexpr double kImuHz = 1000;
 // Support by the ground may come a little late, vibration must not come through.
 constexpr double kSupportCutoffHz = 10;
 // Of the autopilot's own descent: it never pushes and never falls.
@@ -27,8 +26,8 @@ Autopilot::Autopilot(const AutopilotConfig& config, const VehicleConfig& vehicle
       rate_control_(config.control),
       land_detector_(config.land, vehicle),
       health_(config.health, allocation_.mix(), vehicle.mass_kg * kGravity),
-      gyro_filter_(kImuHz, config.control.gyro_cutoff_hz),
-      support_filter_(kImuHz, kSupportCutoffHz),
+      gyro_filter_(kFlightImuHz, config.control.gyro_cutoff_hz),
+      support_filter_(kFlightImuHz, kSupportCutoffHz),
       rate_period_(period_of(config.control.rate_loop_hz)),
       attitude_period_(period_of(config.control.attitude_loop_hz)),
       voltage_v_(config.motor.nominal_voltage_v) {}

@@ -5,6 +5,9 @@
 
 namespace arex {
 
+/// Rate of the flight controller's own IMU.
+inline constexpr double kFlightImuHz = 1000;
+
 /// When a motor is called weak.
 struct MotorWatchConfig {
   double weak_fraction = 0.07;    ///< of a hovering rotor's thrust; sound flights stay below 0.04

@@ -11,7 +11,6 @@
 namespace arex {
 namespace {
 
-constexpr double kImuHz = 1000;
 constexpr double kStepMemory = 50;  // readings
 
 // An IMU at 1 kHz flies the vehicle: it is missed at once. The others correct slowly.
@@ -41,7 +40,7 @@ HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& 
       magnetometer_("magnetometer", kFieldStream),
       barometer_("barometer", kPressureStream),
       power_("power", kPowerStream),
-      vibration_(config.vibration, kImuHz),
+      vibration_(config.vibration, kFlightImuHz),
       motors_(config.motor, mix, weight_n) {}
 
 void HealthMonitor::add_imu(Stamp now, const ImuSample& imu) {

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -12,32 +14,47 @@ namespace arex::sim {
 namespace {
 
 struct Flown : test::Flown {
-  double step_m = 0;  ///< largest of what the controller sees, beyond its velocity, where the
-                      ///< source changes
-  double turn_rad = 0;
+  // The largest of what the controller sees, beyond its velocity, where the source changes.
+  double step_m = 0, turn_rad = 0;
+  int changes = 0;
+};
+
+/// What the controller saw from one estimate to the next, beyond its velocity.
+struct Step {
+  double time_s, step_m, turn_rad;
 };
 
 Flown fly(const std::string& scenario, const std::vector<std::string>& overrides) {
-  double step_m = 0, turn_rad = 0;
+  std::vector<Step> steps;
   Odometry before;
-  std::string beside;  // of the sources, the first that does not fly
   const auto look = [&](const Simulation& simulation) {
-    const FlightView view = simulation.view();
-    const Odometry& now = view.odometry;
+    const Odometry now = simulation.view().odometry;
     if (now.stamp <= before.stamp) return;
-    const std::string beside_now(view.others.empty() ? "" : view.others.front().name);
-    if (before.stamp > 0 && beside_now != beside) {
+    if (before.stamp > 0) {
       const double dt = to_seconds(now.stamp - before.stamp);
       const Mat3 turned = before.X_OB.R * so3::Exp(dt * before.w_OB_B);
-      step_m = std::max(step_m, (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm());
-      turn_rad = std::max(turn_rad, so3::angle(turned.transpose() * now.X_OB.R));
+      steps.push_back({to_seconds(now.stamp),
+                       (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm(),
+                       so3::angle(turned.transpose() * now.X_OB.R)});
     }
-    beside = beside_now;
     before = now;
   };
-  const test::Flown flown = test::fly(
-      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 2, look);
-  return {flown, step_m, turn_rad};
+  Flown flown{test::fly(
+      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 2, look)};
+  // A change is told with the stamp of the first estimate of the new source, or a little later.
+  constexpr double kTold_s = 0.05;
+  std::istringstream events(flown.events);
+  for (std::string line; std::getline(events, line);) {
+    if (line.find("takes over from") == std::string::npos) continue;
+    ++flown.changes;
+    const double told_s = std::stod(line);
+    for (const Step& step : steps) {
+      if (std::abs(step.time_s - told_s) > kTold_s) continue;
+      flown.step_m = std::max(flown.step_m, step.step_m);
+      flown.turn_rad = std::max(flown.turn_rad, step.turn_rad);
+    }
+  }
+  return flown;
 }
 
 // The paper's story, its first two waypoints: both begin together, the LiDAR stays, the eyes drift.
@@ -67,6 +84,7 @@ TEST(VisualFlight, TakesOverFromASilentLidarWithoutAStep) {
   EXPECT_EQ(flown.result.flight.odometry_lost_s, 0);
   EXPECT_TRUE(flown.told("odometry visual_inertial takes over from lidar_inertial"));
   EXPECT_TRUE(flown.told("odometry lidar_inertial takes over from visual_inertial"));
+  EXPECT_EQ(flown.changes, 2);
   EXPECT_GT(flown.step_m, 0);
   EXPECT_LT(flown.step_m, 0.03);
   EXPECT_LT(flown.turn_rad, 0.3 * std::numbers::pi / 180);

@@ -30,10 +30,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr const char* kSelf = "/proc/self/exe";
 constexpr const char* kLock = ".lock";
 constexpr const char* kJson = "blame.json";
-constexpr const char* kReport = "blame.html";
+constexpr const char* kBlameReport = "blame.html";
 constexpr double kLongestWait_s = 0.5;  // between two looks at the flights
 
 sim::FlightEnd end_of(const std::string& name, const std::string& text,
@@ -117,7 +116,7 @@ class Flights {
     const std::string threads = std::to_string(std::clamp(cores() / jobs_, 1, 4));
     flying_.push_back(
         {experiment.name,
-         sim::ChildProcess(kSelf,
+         sim::ChildProcess(sim::kThisProgram,
                            {"run", configuration, "--name", scenario_, "--out", experiment.name,
                             "--threads", threads, "--quiet", "--no-report"},
                            folder_)});
@@ -151,7 +150,7 @@ void expect_own_folder(const fs::path& folder) {
                       ": holds a run or a sweep, expected a folder for the blame");
   }
   check_writable(folder / kJson);
-  check_writable(folder / kReport);
+  check_writable(folder / kBlameReport);
 }
 
 fs::path folder_for(const BlameArguments& arguments, const fs::path& run) {
@@ -198,11 +197,11 @@ int blame(const BlameArguments& arguments) {
                                    sim::read_summary(folder / experiment.name).value()));
   }
   blame.verdict = sim::judge(blame.flights);
-  write_atomically(folder / kReport, sim::blame_report_html(blame, folder));
+  write_atomically(folder / kBlameReport, sim::blame_report_html(blame, folder));
   write_atomically(folder / kJson, sim::json_text(sim::blame_json(blame)));
   lock.remove();
   std::printf("%s%s\n", sim::blame_table(blame).c_str(),
-              printable((folder / kReport).string()).c_str());
+              printable((folder / kBlameReport).string()).c_str());
   flush_standard_output();
   return 0;
 }

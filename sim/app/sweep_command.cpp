@@ -29,7 +29,6 @@
 namespace arex::app {
 namespace {
 
-constexpr const char* kSelf = "/proc/self/exe";
 constexpr double kTablePeriod_s = 60;             // a long sweep can be looked at while it flies
 constexpr const char* kDriverLock = ".lock";      // of the local sweep or the submission
 constexpr const char* kWorkersLock = ".workers";  // shared by Slurm's tasks
@@ -253,7 +252,7 @@ int fly(const sim::SweepPlan& plan, const sim::SweepFolder& folder, int jobs) {
   SweepLine line(total - orders.size(), total);
   double next_table_s = kTablePeriod_s;
   sim::Supervisor supervisor(
-      folder, kSelf, {jobs, plan.timeout_s, plan.retries},
+      folder, sim::kThisProgram, {jobs, plan.timeout_s, plan.retries},
       {[&](const auto& order, const auto& state) { line.broken(order, state); },
        [&](const auto& progress) {
          line.update(progress, [&] { return in_flight(plan, folder); });
@@ -284,7 +283,8 @@ int submit(const sim::SweepPlan& plan, const sim::SweepFolder& folder,
   std::vector<sim::RunOrder> orders = missing_runs(plan, folder);
   const std::size_t missing = orders.size();
   std::erase_if(orders, [&](const auto& order) { return queue.runs.count(order.id) > 0; });
-  const sim::SlurmSubmission submission = sim::submit(folder, plan, orders, kSelf, queue, options);
+  const sim::SlurmSubmission submission =
+      sim::submit(folder, plan, orders, sim::kThisProgram, queue, options);
   std::size_t submitted = 0;
   for (const sim::SlurmBatch& batch : submission.batches) {
     submitted += batch.runs;
@@ -315,7 +315,7 @@ std::size_t array_size_of_cluster() {
 
 int sweep(const SweepArguments& arguments) {
   const sim::SweepPlan plan = sim::expand(sim::load_sweep_file(resolve_input_file(arguments.file)),
-                                          sim::content_hash_of_file(kSelf));
+                                          sim::content_hash_of_file(sim::kThisProgram));
   if (arguments.dry_run) return dry_run(plan, sim::SweepFolder(arguments.out));
   if (arguments.status) return status(plan, sim::SweepFolder(arguments.out));
 
@@ -362,7 +362,7 @@ int sweep_task(const SweepTaskArguments& arguments) {
   }
   const sim::RunOrder order = batch.runs[arguments.index];
   if (folder.summary(order.id)) return 0;
-  sim::Supervisor supervisor(folder, kSelf, {1, batch.timeout_s, batch.retries},
+  sim::Supervisor supervisor(folder, sim::kThisProgram, {1, batch.timeout_s, batch.retries},
                              {[](const auto& broken, const auto& state) {
                                 std::fprintf(stderr, "%s: %s\n", broken.id.c_str(),
                                              state.detail.c_str());

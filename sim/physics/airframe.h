@@ -12,6 +12,9 @@ namespace arex::sim {
 
 enum class AirframePart : std::uint8_t { kBody, kArm, kRotor, kLidar, kCamera, kLeg };
 
+/// Sense of each rotor's rotation about B's z (MotorCommand's order).
+inline constexpr std::array<double, 4> kRotorSpin{1, 1, -1, -1};
+
 /// The true vehicle in B: models/arex/arex.xml, and what a scenario makes of it.
 struct Airframe {
   double mass_kg = 0;

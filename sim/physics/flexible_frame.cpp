@@ -10,8 +10,6 @@ namespace arex::sim {
 namespace {
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-/// Sense of rotation about B's z (MotorCommand's order).
-constexpr std::array<double, 4> kSpin{1, 1, -1, -1};
 
 }  // namespace
 
@@ -37,7 +35,7 @@ FlexibleFrame::Drive FlexibleFrame::unbalance(const std::array<double, 4>& rotor
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   for (std::size_t i = 0; i < 4; ++i) {
     const double speed = rotor_radps[i], ratio = speed / config_.reference_speed_radps;
-    angle_rad_[i] = std::fmod(angle_rad_[i] + kSpin[i] * speed * kSecondsPerTick, kTwoPi);
+    angle_rad_[i] = std::fmod(angle_rad_[i] + kRotorSpin[i] * speed * kSecondsPerTick, kTwoPi);
     const double pull = config_.unbalance_n * ratio * ratio;
     const Vec3 pulled(pull * std::cos(angle_rad_[i]), pull * std::sin(angle_rad_[i]), 0);
     force += pulled;

@@ -14,10 +14,6 @@
 namespace arex::sim {
 namespace {
 
-constexpr double kTwoPi = 2 * std::numbers::pi;
-/// Sense of rotation about B's z (MotorCommand's order).
-constexpr std::array<double, 4> kSpin{1, 1, -1, -1};
-
 bool is_ground(worlds::SurfaceClass surface) {
   using worlds::SurfaceClass;
   return surface == SurfaceClass::kGround || surface == SurfaceClass::kFloor ||
@@ -92,15 +88,16 @@ class Physics::Impl {
       const Vec3 air = air_B + w.cross(airframe.p_BR[i]);
       const double static_thrust = rotor.thrust_coefficient * speed * speed;
       // Thrust falls linearly with the advance ratio J = v / (n D); T = T0 - T0/w * w J / J0.
-      const double axial = air.z() * kTwoPi / (rotor.diameter_m * rotor.zero_thrust_advance_ratio);
+      const double axial =
+          air.z() * (2 * std::numbers::pi) / (rotor.diameter_m * rotor.zero_thrust_advance_ratio);
       const double thrust = std::max(0.0, rotor.thrust_coefficient * speed * (speed - axial));
       const Vec3 rotor_force(-rotor.drag_s_per_m * thrust * air.x(),
                              -rotor.drag_s_per_m * thrust * air.y(), thrust);
       force += rotor_force;
       torque += airframe.p_BR[i].cross(rotor_force);
-      torque.z() -= kSpin[i] * (rotor.torque_ratio_m * static_thrust +
-                                rotor.inertia_kgm2 * powertrain_.rotor_acceleration()[i]);
-      spin_momentum += kSpin[i] * rotor.inertia_kgm2 * speed;
+      torque.z() -= kRotorSpin[i] * (rotor.torque_ratio_m * static_thrust +
+                                     rotor.inertia_kgm2 * powertrain_.rotor_acceleration()[i]);
+      spin_momentum += kRotorSpin[i] * rotor.inertia_kgm2 * speed;
     }
     torque -= w.cross(Vec3(0, 0, spin_momentum));  // gyroscopic
 

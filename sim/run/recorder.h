@@ -40,6 +40,11 @@ struct CloudGrowth {
   std::size_t points = 0;
 };
 
+/// How often what was written is given to the disk, for a killed run, and how finely a replay of
+/// the map resolves its growth.
+inline constexpr Stamp kFlushPeriod = 1000 * kNanosecondsPerTick;
+inline constexpr Stamp kGrowthPeriod = 500 * kNanosecondsPerTick;
+
 /// What a run writes into its folder. Everything but the summary is written while flying, so that a
 /// killed run leaves what it had; the summary is written last and atomically: a folder without it
 /// is unfinished. A disk that refuses does not end the flight by an exception: each file that could

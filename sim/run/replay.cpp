@@ -14,12 +14,9 @@
 namespace arex::sim {
 namespace {
 
-constexpr Stamp kTick = kNanosecondsPerTick;
 constexpr Stamp kSamplePeriod = FlightScorer::kPeriod;
-constexpr Stamp kRowPeriod = 50 * kTick;  // 20 Hz: flight.csv
-constexpr Stamp kFlushPeriod = 1000 * kTick;
-constexpr Stamp kGrowthPeriod = 500 * kTick;
-constexpr Stamp kGrowthDue = 1000 * kTick;
+constexpr Stamp kRowPeriod = 50 * kNanosecondsPerTick;  // 20 Hz: flight.csv
+constexpr Stamp kGrowthDue = 1000 * kNanosecondsPerTick;
 // After so long a pause, time goes on just before the next message.
 constexpr Stamp kLongestPause = 60 * kNanosecondsPerSecond;
 constexpr Stamp kBeforeNext = kNanosecondsPerSecond;
@@ -28,7 +25,9 @@ constexpr Stamp kLongestGap = kNanosecondsPerSecond / 10;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 Stamp tick_before(Stamp stamp) {
-  return stamp >= 0 ? stamp / kTick * kTick : -((-stamp + kTick - 1) / kTick) * kTick;
+  return stamp >= 0
+             ? stamp / kNanosecondsPerTick * kNanosecondsPerTick
+             : -((-stamp + kNanosecondsPerTick - 1) / kNanosecondsPerTick) * kNanosecondsPerTick;
 }
 
 /// What the mission and the planner say is of nobody's concern, and what the watch finds by the
@@ -139,7 +138,7 @@ bool Replay::tick() {
   }
   record();
   if (!coming_ || interrupted_) return false;
-  now_ += kTick;
+  now_ += kNanosecondsPerTick;
   return true;
 }
 

@@ -23,8 +23,6 @@ constexpr Stamp kCloudPeriod = 10'000 * kTick;  // the map as a killed run leave
 constexpr Stamp kPathPeriod = 100 * kTick;      // 10 Hz: revisits and turns
 constexpr Stamp kCoveragePeriod = 1000 * kTick;
 constexpr Stamp kScoreDue = 1000 * kTick;  // the flight does not wait for what is scored or written
-constexpr Stamp kGrowthPeriod = 500 * kTick;  // what a replay of the map resolves
-constexpr Stamp kFlushPeriod = 1000 * kTick;  // what a killed run leaves
 
 /// What the planner counts with when it asks how fast it may fly.
 StoppingModel stopping_of(const StackConfig& stack) {

@@ -10,6 +10,9 @@
 
 namespace arex::sim {
 
+/// The program that runs: a sweep and a blame start themselves again.
+inline constexpr const char* kThisProgram = "/proc/self/exe";
+
 /// How a child ended and what it took.
 struct ChildExit {
   int exit_code = -1;  ///< -1 if a signal ended it

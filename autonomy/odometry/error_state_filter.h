@@ -46,6 +46,9 @@ class ErrorStateFilter {
                const Eigen::Matrix<double, Rows, kErrorDim>& H,
                const Eigen::Matrix<double, Rows, Rows>& V);
 
+  /// Adds doubt of the IMU's delay, of which nothing else is the worse yet.
+  void doubt_delay(double std_s) { P_(kTimeOffset, kTimeOffset) += std_s * std_s; }
+
   /// Covariance of [R_OB, p_OB, R_BL, p_BL].
   [[nodiscard]] PoseInformation::Matrix pose_covariance() const;
 

@@ -165,7 +165,8 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
     forget_map();
     return false;
   }
-  stamp_ = correction_stamp_ = stamp;
+  stamp_ = correction_stamp_ = started_ = stamp;
+  delay_unknown_ = false;
   corrected_position_ = filter_.state().p_OB;
   stood_at_ = filter_.state().X_OB();
   return true;
@@ -212,12 +213,31 @@ std::vector<ScanPoint> ScanCorrector::register_with_motion(const LidarScan& scan
   }
   gyro_.missing_radps = made.missing_radps;
   stamp_ = middle_of(scan);
-  if (made.registration.accepted) note_field();
+  if (made.registration.accepted) {
+    note_field();
+    doubt_delay();
+  }
   update.registration = std::move(made.registration);
   update.recovered = made.recovered;
   update.gyro_clipped = clipped;
   imu_.forget_before(stamp_ - kShakenFor);
   return std::move(made.points);
+}
+
+void ScanCorrector::doubt_delay() {
+  constexpr double kSigmas = 4;
+  if (delay_unknown_) return;
+  const ImuNoiseConfig& imu = config_.imu;
+  const double known = imu.delay_std_s * imu.delay_std_s + imu.delay_walk_density *
+                                                               imu.delay_walk_density *
+                                                               to_seconds(stamp_ - started_);
+  // By so much scans move what was known with that variance, if it was.
+  const double moved_variance =
+      std::max(0.01 * known, known - filter_.covariance()(kTimeOffset, kTimeOffset));
+  const double moved = filter_.state().t_d - imu.delay_s;
+  if (moved * moved <= kSigmas * kSigmas * moved_variance) return;
+  filter_.doubt_delay(imu.unknown_delay_std_s);
+  delay_unknown_ = true;
 }
 
 void ScanCorrector::note_field() {

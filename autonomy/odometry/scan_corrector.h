@@ -93,6 +93,8 @@ class ScanCorrector {
   /// The motion that follows from `x`, the state at `from`; becomes that at `to`.
   [[nodiscard]] std::vector<MotionSegment> motion(Stamp from, Stamp to, NavigationState& x,
                                                   GyroCompletion& gyro) const;
+  /// Takes the IMU's delay for unknown once scans have drawn it further than it was known to.
+  void doubt_delay();
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
@@ -116,6 +118,8 @@ class ScanCorrector {
   OdometryNeed need_ = OdometryNeed::kImu;
   Stamp stamp_ = 0;  ///< of the filter's state
   Stamp correction_stamp_ = 0;
+  Stamp started_ = 0;
+  bool delay_unknown_ = false;
   Vec3 corrected_position_ = Vec3::Zero();
   OdometryStatus status_ = OdometryStatus::kInitialising;
   int refused_in_a_row_ = 0;

@@ -114,8 +114,8 @@ VibrationModel::Shaper VibrationModel::mode_shaper(double frequency_hz, double d
   return shaper;
 }
 
-VibrationModel::Six VibrationModel::Shaper::filter(const Six& white) {
-  const Six x = gain.cwiseProduct(white);
+VibrationModel::Six VibrationModel::Shaper::filter(const Six& force) {
+  const Six x = gain.cwiseProduct(force);
   const Six y = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2;
   x2 = x1;
   x1 = x;
@@ -126,26 +126,28 @@ VibrationModel::Six VibrationModel::Shaper::filter(const Six& white) {
 
 VibrationModel::Shake VibrationModel::step(const std::array<double, 4>& rotor_radps) {
   Shake shake;
+  if (config_.level == VibrationLevel::kNone) return shake;
   double thrust = 0;  // over that at the reference speed
   for (const double speed : rotor_radps) {
     const double ratio = speed / config_.reference_speed_radps;
     thrust += ratio * ratio / static_cast<double>(kRotors);
   }
-  if (thrust > 0 && config_.level != VibrationLevel::kNone) {
-    const Six line = lines(rotor_radps);
-    const Six value = thrust * broadband() + line;
-    shake.accel_mps2 = value.head<3>();
-    shake.gyro_radps = value.tail<3>();
-  }
+  const Six value = broadband(thrust) + lines(rotor_radps);
+  shake.accel_mps2 = value.head<3>();
+  shake.gyro_radps = value.tail<3>();
   return shake;
 }
 
-VibrationModel::Six VibrationModel::broadband() {
+// What shakes grows with thrust, not what it does to the structure: rates that were scaled as the
+// rotors spin up would add up to an angle that never comes back.
+VibrationModel::Six VibrationModel::broadband(double thrust) {
   Six sum = Six::Zero();
   for (Shaper& shaper : shapers_) {
-    Six white;
-    for (double& value : white) value = stream_.normal();
-    sum += shaper.filter(white);
+    Six force = Six::Zero();
+    if (thrust > 0) {
+      for (double& value : force) value = thrust * stream_.normal();
+    }
+    sum += shaper.filter(force);
   }
   return sum;
 }

@@ -54,7 +54,7 @@ using VibrationSpectrum = std::array<AxisVibration, 6>;
 /// Broadband shaking from propeller wash, bare and through three modes of the structure, and lines
 /// at once and twice each rotor's own speed. All grow with thrust, that is with the square of the
 /// speed; what does not turn does not shake. The spectra vanish below 3 Hz, for an airframe that is
-/// shaken stays where it is: neither velocity nor attitude drifts by it.
+/// shaken stays where it is: neither velocity nor attitude drifts by it, nor by how thrust changes.
 ///
 /// The four rotors turn at different speeds, so their lines beat. Their unbalances differ; squared
 /// they sum to one, as the level's amplitudes mean.
@@ -79,11 +79,11 @@ class VibrationModel {
     double b0 = 0, b1 = 0, b2 = 0, a1 = 0, a2 = 0;
     Six gain = Six::Zero();
     Six x1 = Six::Zero(), x2 = Six::Zero(), y1 = Six::Zero(), y2 = Six::Zero();
-    Six filter(const Six& white);
+    Six filter(const Six& force);
   };
   static Shaper wash_shaper();
   static Shaper mode_shaper(double frequency_hz, double damping);
-  Six broadband();
+  Six broadband(double thrust);
   Six lines(const std::array<double, kRotors>& rotor_radps);
 
   VibrationConfig config_;

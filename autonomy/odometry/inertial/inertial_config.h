@@ -7,7 +7,8 @@ namespace arex {
 /// What an odometry believes of its IMU.
 struct ImuNoiseConfig {
   double delay_s = 0.0025;                  ///< of the readings behind their stamps
-  double delay_std_s = 0.01;                ///< 1 sigma of that before take-off
+  double delay_std_s = 0.001;               ///< 1 sigma of that before take-off
+  double unknown_delay_std_s = 0.03;        ///< 1 sigma once it turns out to be another
   double delay_walk_density = 2e-4;         ///< s/sqrt(s)
   double gyro_scale_std = 0.02;             ///< 1 sigma of the scale's error before take-off
   double gyro_noise_density = 1.5e-4;       ///< rad/s/sqrt(Hz)
@@ -23,9 +24,12 @@ struct ImuNoiseConfig {
       "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
       "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added. Estimated from there on");
     f("delay_std_s", delay_std_s,
-      "1 sigma of the delay before take-off: clocks that nobody synchronised; one that is 50 ms "
-      "off is "
-      "found as well. 0 takes it as known");
+      "1 sigma of the delay before take-off. A looser one lets the first second in the air, whose "
+      "few "
+      "scans hardly tell it, draw it by as much and tilt the map. 0 takes it as known");
+    f("unknown_delay_std_s", unknown_delay_std_s,
+      "1 sigma of a delay that scans have drawn further than delay_std_s explains: clocks that "
+      "nobody synchronised");
     f("delay_walk_density", delay_walk_density,
       "s/sqrt(s), walk of the delay: what was learned of it while it was far off is forgotten in "
       "some ten seconds");
@@ -50,6 +54,8 @@ struct ImuNoiseConfig {
     f.check(gyro_noise_density > 0 && accel_noise_density > 0,
             "gyro_noise_density > 0, accel_noise_density > 0");
     f.check(delay_std_s >= 0 && delay_std_s <= 0.2, "0 <= delay_std_s <= 0.2");
+    f.check(unknown_delay_std_s >= 0 && unknown_delay_std_s <= 0.2,
+            "0 <= unknown_delay_std_s <= 0.2");
     f.check(delay_walk_density >= 0 && gyro_scale_std >= 0 && gyro_scale_std <= 0.5,
             "delay_walk_density >= 0, 0 <= gyro_scale_std <= 0.5");
     f.check(gyro_walk_density >= 0 && accel_walk_density >= 0,

@@ -197,6 +197,27 @@ TEST(ImuVibration, DriftsNeitherVelocityNorAttitude) {
   }
 }
 
+// Spun up, flown and spun down, it is where it was: an elastic mount comes back. (Rates that grew
+// with the thrust leave 0.5 mrad where the rotors start, which tilts whatever is mapped then.)
+TEST(ImuVibration, LeavesNoAngleBehindAsRotorsStartAndStop) {
+  constexpr int kRamp = 200, kFlight = 2000, kRest = 2000;  // ticks
+  constexpr int kSeeds = 8;
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    VibrationModel model({}, seed);
+    Vec3 angle = Vec3::Zero();
+    for (int i = 0; i < 2 * kRamp + kFlight + kRest; ++i) {
+      const int until_stop = 2 * kRamp + kFlight - i;
+      const double share = std::clamp(std::min(i, until_stop) / static_cast<double>(kRamp), 0., 1.);
+      const double speed = 716 * share;
+      angle += 1e-3 * model.step({speed, speed, speed, speed}).gyro_radps;
+    }
+    squares += angle.squaredNorm() / (3 * kSeeds);
+  }
+  // Of a line that sweeps from zero speed on, a few hundredths of a milliradian remain.
+  EXPECT_LT(std::sqrt(squares), 1e-4);
+}
+
 #ifdef AREX_REAL_DATA
 /// EuRoC's Firefly in the air: 10 to 138 s of the recording, 200 Hz.
 SixSeries firefly() {

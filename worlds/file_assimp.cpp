@@ -149,6 +149,9 @@ FileScene read_assimp(const std::filesystem::path& file) {
       importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_ValidateDataStructure);
   if (scene == nullptr) {
     const std::string reason = importer.GetErrorString();
+    for (const char* empty : {"contains no faces", "mNumMeshes is 0", "no facets defined"}) {
+      if (reason.find(empty) != std::string::npos) throw std::runtime_error("holds no faces");
+    }
     throw std::runtime_error("cannot be read" + (reason.empty() ? "" : ": " + reason));
   }
   FileScene out = Flattener(*scene, file.parent_path()).flatten();

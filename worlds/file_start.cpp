@@ -254,7 +254,11 @@ FoundStart search(const World& world, const Ground& ground, Space& space, double
     if (static_cast<double>(volume) > kFairShare * static_cast<double>(space.passable)) break;
   }
   if (!best)
-    throw ConfigError("holds no place to start from: level, with room around and above it");
+    throw ConfigError(fmt::format(
+        "holds no place to start from: level, with room around and above it. It is {:.3g} x {:.3g} "
+        "m large: see file.scale, file.up and, of a cloud, file.voxel_m",
+        world.bounds.high.x() - world.bounds.low.x(),
+        world.bounds.high.y() - world.bounds.low.y()));
   return {
       {so3::from_yaw(yaw_rad), *best}, room_at(world, *best + 0.5 * Vec3::UnitZ(), best->z()), {}};
 }

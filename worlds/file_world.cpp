@@ -78,6 +78,12 @@ FileScene read_contained(const FileRecipe& recipe, const std::string& ending) {
       run_contained([&] { return read_scene(recipe, ending).pack(); }, limits));
 }
 
+/// Ends with what is wrong, and with what was left out on the way there.
+[[noreturn]] void refuse(std::string what, const FileScene& scene) {
+  for (const std::string& note : scene.notes) what += "; " + note;
+  throw ConfigError(what);
+}
+
 /// From the file's axes to z up.
 Mat3 upright(FileUp up) {
   Mat3 R = Mat3::Identity();
@@ -146,9 +152,20 @@ void check_indices(const FileScene& scene) {
   }
   for (const std::uint32_t group : scene.group_of_triangle) sound &= group < scene.groups.size();
   for (const FilePrimitive& p : scene.primitives) {
-    sound &= p.group < scene.groups.size() && p.size.minCoeff() >= 0;
+    sound &= p.group < scene.groups.size();
   }
   if (!sound) throw ConfigError("has faces of vertices that it lacks");
+}
+
+/// @return how many shapes had no extent
+std::size_t drop_degenerate(std::vector<FilePrimitive>& primitives) {
+  return std::erase_if(primitives, [](const FilePrimitive& primitive) {
+    if (primitive.size.minCoeff() < 0) throw ConfigError("has a shape of negative size");
+    const bool box = primitive.kind == FilePrimitive::Kind::kBox;
+    const double least =
+        box ? primitive.size.minCoeff() : std::min(primitive.size.x(), primitive.size.y());
+    return !(least > 1e-6);
+  });
 }
 
 /// @return how many triangles had no area
@@ -246,13 +263,6 @@ void add_primitive(MeshBuilder& builder, const FilePrimitive& primitive, std::ui
   }
 }
 
-bool is_degenerate(const FilePrimitive& primitive) {
-  const bool box = primitive.kind == FilePrimitive::Kind::kBox;
-  const double least =
-      box ? primitive.size.minCoeff() : std::min(primitive.size.x(), primitive.size.y());
-  return !(least > 1e-6);
-}
-
 void expect_fair_extent(const Bounds& bounds) {
   const Vec3 size = bounds.high - bounds.low;
   if (bounds.low.cwiseAbs().maxCoeff() > kFarthest ||
@@ -296,7 +306,6 @@ World build(const FileRecipe& recipe, FileScene& scene, std::vector<bool>& named
   unshare(scene);
   builder.add_mesh(scene.vertices, scene.triangles, object_of_triangle);
   for (const FilePrimitive& primitive : scene.primitives) {
-    if (is_degenerate(primitive)) continue;
     const FileClassRule* rule = rule_for(scene.groups[primitive.group], recipe.classes);
     const auto surface = rule ? rule->surface_class : class_by_name(scene.groups[primitive.group]);
     add_primitive(builder, primitive, objects.of(primitive.group, false),
@@ -421,8 +430,9 @@ FileWorld load(const FileRecipe& recipe, double vehicle_radius_m) {
   FileScene scene = read_contained(recipe, out.format);
   mesh_voxels(scene, recipe.voxel_m / recipe.scale, recipe.voxel_points);
   if (scene.triangles.empty() && scene.primitives.empty()) {
-    throw ConfigError("holds no faces, no shapes and no points");
+    refuse("holds no faces, no shapes and no points", scene);
   }
+  if (!(scene.unit_m > 0)) throw ConfigError(fmt::format("names a unit of {:g} m", scene.unit_m));
   if (scene.triangles.size() > kMostTriangles) {
     throw ConfigError("holds " + std::to_string(scene.triangles.size()) +
                       " triangles, expected at most " + std::to_string(kMostTriangles));
@@ -439,8 +449,14 @@ FileWorld load(const FileRecipe& recipe, double vehicle_radius_m) {
   out.up = enum_names(FileUpAxis{})[static_cast<std::size_t>(up)];
   place(recipe, up, scene);
   out.dropped = drop_slivers(scene);
+  const std::size_t without_extent = drop_degenerate(scene.primitives);
   if (scene.triangles.empty() && scene.primitives.empty()) {
-    throw ConfigError("holds " + std::to_string(out.dropped) + " faces, all of them without area");
+    const std::string shapes =
+        without_extent > 0 ? fmt::format(" and {} shapes", without_extent) : "";
+    refuse(fmt::format("holds {} faces{}, all of them without area", out.dropped, shapes), scene);
+  }
+  if (without_extent > 0) {
+    scene.notes.push_back(fmt::format("{} shapes without extent left out", without_extent));
   }
   out.unit_m = scene.unit_m;
   out.notes = std::exchange(scene.notes, {});

@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
+#include "config/config.h"
 #include "worlds/reflectivity.h"
 #include "worlds/sampling.h"
 #include "worlds/undergrowth.h"
@@ -99,8 +101,12 @@ bool free_for_undergrowth(const ForestRecipe& recipe, const Vec2& p, double reac
   return p.norm() > recipe.start_radius_m + reach && !is_cleared(recipe, p, reach);
 }
 
+/// Whether what grows at a point of the ground is seen closely, or how coarse it may be.
+using DetailAt = std::function<Detail(const Vec2&)>;
+
 void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const HeightField& terrain,
-                     const std::vector<TreeSite>& trees, std::uint64_t seed) {
+                     const std::vector<TreeSite>& trees, const DetailAt& detail_at,
+                     std::uint64_t seed) {
   const UndergrowthRecipe& plants = recipe.undergrowth;
   const Vec2 extent = recipe.size_m - 2 * Vec2::Constant(recipe.edge_m);
   const auto ground = [&](const Vec2& p) { return Vec3(p.x(), p.y(), terrain.at(p.x(), p.y())); };
@@ -117,7 +123,7 @@ void add_undergrowth(MeshBuilder& builder, const ForestRecipe& recipe, const Hei
     const double height = plants.shrub_height_m * scale;
     if (!free_for_undergrowth(recipe, p, height)) return;
     const auto leaves = static_cast<int>(std::lround(plants.shrub_leaves * scale * scale));
-    add_shrub(builder, ground(p), height, leaves, r);
+    add_shrub(builder, ground(p), height, leaves, r, detail_at(p));
   });
   scatter("worlds/forest/ferns", plants.fern_density_per_m2, [&](const Vec2& p, RandomStream r) {
     const double length = plants.fern_length_m * r.uniform(0.6, 1.3);
@@ -157,18 +163,32 @@ std::vector<TreeSite> place_trees(const ForestRecipe& recipe, std::uint64_t seed
   return sites;
 }
 
-double ForestRecipe::expected_triangles() const {
+Eigen::AlignedBox2d ForestRecipe::detailed(const std::optional<Eigen::AlignedBox2d>& flown) const {
+  if (!flown) return extent();
+  const Vec2 around = Vec2::Constant(kDetail);
+  Eigen::AlignedBox2d box(flown->min() - around, flown->max() + around);
+  box.extend(Vec2(-2 * around)).extend(Vec2(2 * around));
+  return box.intersection(extent());
+}
+
+double ForestRecipe::expected_triangles(const std::optional<Eigen::AlignedBox2d>& flown) const {
   // Of a tree's trunk, of each branch or twig, of a fern and of a log, on average.
   constexpr double kTrunk = 300, kBranch = 24, kFern = 60, kLog = 200;
+  constexpr double kCoarseTrunk = 150, kCoarseBranch = 8;
   const double of_tree =
       kTrunk + kBranch * (tree.branches * (1.0 + tree.twigs_per_branch) + tree.low_branches) +
       2.0 * tree.leaves;
-  const double per_m2 = tree_density_per_m2 * of_tree +
-                        undergrowth.shrub_density_per_m2 * 2.0 * undergrowth.shrub_leaves +
-                        undergrowth.fern_density_per_m2 * kFern +
+  const double of_coarse_tree = kCoarseTrunk + kCoarseBranch * (tree.branches + tree.low_branches) +
+                                2.0 * tree.leaves / kLeavesMerged;
+  const double of_shrub = 2.0 * undergrowth.shrub_leaves;
+  const double plants = tree_density_per_m2 * of_tree + undergrowth.shrub_density_per_m2 * of_shrub;
+  const double coarse_plants = tree_density_per_m2 * of_coarse_tree +
+                               undergrowth.shrub_density_per_m2 * of_shrub / kLeavesMerged;
+  const double ground = undergrowth.fern_density_per_m2 * kFern +
                         undergrowth.log_density_per_m2 * kLog +
                         2 / (ground_spacing_m * ground_spacing_m);
-  return per_m2 * size_m.prod();
+  const double near_m2 = detailed(flown).volume();
+  return plants * near_m2 + coarse_plants * (size_m.prod() - near_m2) + ground * size_m.prod();
 }
 
 ForestRecipe pine_stand() {
@@ -203,7 +223,20 @@ ForestRecipe pine_stand() {
   return recipe;
 }
 
-World build(const ForestRecipe& recipe, std::uint64_t seed) {
+World build(const ForestRecipe& recipe, std::uint64_t seed,
+            const std::optional<Eigen::AlignedBox2d>& flown) {
+  if (const double expected = recipe.expected_triangles(flown);
+      expected > ForestRecipe::kMostTriangles) {
+    throw ConfigError(
+        "expected at most 1e7 triangles where the mission leads and around it, and "
+        "these would be " +
+        std::to_string(std::llround(expected)) +
+        ": a smaller forest, fewer leaves, or less to explore");
+  }
+  const Eigen::AlignedBox2d detailed = recipe.detailed(flown);
+  const DetailAt detail_at = [&](const Vec2& p) {
+    return !flown || detailed.contains(p) ? Detail::kFull : Detail::kCoarse;
+  };
   MeshBuilder builder;
   RandomStream ground_stream(seed, "worlds/forest/ground");
   const HeightField terrain = make_terrain(recipe, ground_stream.fork(0));
@@ -224,9 +257,9 @@ World build(const ForestRecipe& recipe, std::uint64_t seed) {
   const std::vector<TreeSite> sites = place_trees(recipe, seed);
   for (const auto& [p, index] : sites) {
     add_tree(builder, recipe.tree, {p.x(), p.y(), terrain.at(p.x(), p.y())}, allowed,
-             tree_stream.fork(index));
+             tree_stream.fork(index), detail_at(p));
   }
-  add_undergrowth(builder, recipe, terrain, sites, seed);
+  add_undergrowth(builder, recipe, terrain, sites, detail_at, seed);
 
   World world = builder.finish();
   world.bounds.low.head<2>() = terrain.origin;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "worlds/poisson_disc.h"
@@ -82,7 +83,14 @@ struct ForestRecipe {
 
   static constexpr double kMostTriangles = 1e7;  ///< about 2 GB with the tree for the rays
   /// Roughly, and rather too many: nothing is taken off for what is cleared.
-  [[nodiscard]] double expected_triangles() const;
+  /// @param flown as that of build()
+  [[nodiscard]] double expected_triangles(
+      const std::optional<Eigen::AlignedBox2d>& flown = {}) const;
+  /// Trees and shrubs further than this from where a mission leads, and than twice this from the
+  /// start, are coarse, m: no nearer than the maps' rays reach from there.
+  static constexpr double kDetail = 20;
+  /// Where they are not: within those distances, or everywhere without `flown`.
+  [[nodiscard]] Eigen::AlignedBox2d detailed(const std::optional<Eigen::AlignedBox2d>& flown) const;
   /// The ground, along x and y from the start, m.
   [[nodiscard]] Eigen::AlignedBox2d extent() const { return {-0.5 * size_m, 0.5 * size_m}; }
 
@@ -115,7 +123,9 @@ struct ForestRecipe {
     f.check(corridors.size() <= 100, "at most 100 corridors");
     f.check(size_m.prod() <= 4e6 * ground_spacing_m * ground_spacing_m,
             "size_m / ground_spacing_m at most 4e6 samples of the ground in all");
-    f.check(expected_triangles() <= kMostTriangles,
+    // Of a mission that stays at the start; build() knows where it leads.
+    const Eigen::AlignedBox2d start(Vec2(0, 0));
+    f.check(expected_triangles(start) <= kMostTriangles,
             "at most 1e7 triangles (expected of size_m, tree_density_per_m2, tree.leaves, "
             "tree.branches, tree.twigs_per_branch, undergrowth.shrub_density_per_m2, "
             "undergrowth.shrub_leaves, undergrowth.fern_density_per_m2, "
@@ -130,7 +140,11 @@ ForestRecipe pine_stand();
 
 /// W's origin is at the start's x and y. World::bounds spans the ground and reaches the highest
 /// leaf.
-World build(const ForestRecipe& recipe, std::uint64_t seed);
+/// @param flown where the mission leads, along x and y from the start, m: what is far from it is
+/// coarse. Without it nothing is.
+/// @throws ConfigError (without FILE:LINE) if more than kMostTriangles are to be expected.
+World build(const ForestRecipe& recipe, std::uint64_t seed,
+            const std::optional<Eigen::AlignedBox2d>& flown = {});
 
 /// Where a tree stands, x and y; the index names its random stream, so that it grows the same
 /// whichever others are cleared away.

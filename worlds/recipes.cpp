@@ -16,11 +16,17 @@ constexpr double kResolution = 0.2;      // m; conservative cells make every gap
 constexpr double kReachableShare = 0.5;  // of the free space, at least
 
 /// What the start must give access to.
-Bounds region_to_reach(const WorldConfig& config, const World& world) {
+Bounds region_to_reach(const WorldConfig& config, const World& world,
+                       const std::optional<Eigen::AlignedBox2d>& flown) {
   Bounds region = world.bounds;
   region.high.z() = std::min(region.high.z(), world.X_WS.p.z() + kCheckedHeight);
   with_recipe(config, [&](const auto& recipe) {
     if constexpr (requires { recipe.limit_reach(region); }) recipe.limit_reach(region);
+    if constexpr (requires { recipe.detailed(flown); }) {
+      const Eigen::AlignedBox2d near = recipe.detailed(flown);
+      region.low.head<2>() = region.low.head<2>().cwiseMax(near.min());
+      region.high.head<2>() = region.high.head<2>().cwiseMin(near.max());
+    }
   });
   return region;
 }
@@ -66,12 +72,17 @@ double reachable_share(const World& world, const Bounds& region, double radius_m
 
 }  // namespace
 
-World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m) {
+World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m,
+                  const std::optional<Eigen::AlignedBox2d>& flown) {
   if (config.kind == WorldKind::kFile) {
     return load_file_world(config.file, vehicle_radius_m).world;
   }
-  World world = with_recipe(config, [&](const auto& recipe) { return build(recipe, seed); });
-  const double share = reachable_share(world, region_to_reach(config, world), vehicle_radius_m);
+  World world = with_recipe(config, [&](const auto& recipe) {
+    if constexpr (requires { build(recipe, seed, flown); }) return build(recipe, seed, flown);
+    return build(recipe, seed);
+  });
+  const Bounds region = region_to_reach(config, world, flown);
+  const double share = reachable_share(world, region, vehicle_radius_m);
   if (share < kReachableShare) {
     const std::string name(enum_names(config.kind)[static_cast<std::size_t>(config.kind)]);
     throw ConfigError("the " + name + " recipe with seed " + std::to_string(seed) +

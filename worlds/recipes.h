@@ -45,7 +45,8 @@ struct WorldConfig {
 };
 
 /// Hands the chosen recipe to `use`: a further one is added here, and in WorldConfig. A recipe has
-/// build(recipe, seed), extent() and, if a vehicle cannot get everywhere in it, limit_reach().
+/// build(recipe, seed[, flown]), extent() and, if a vehicle cannot get everywhere in it,
+/// limit_reach().
 /// @pre not of kind file
 template <class Use>
 auto with_recipe(const WorldConfig& config, const Use& use) {
@@ -68,7 +69,10 @@ auto with_recipe(const WorldConfig& config, const Use& use) {
 /// Builds the chosen world; a pure function of its arguments, and of the file for kind file.
 /// @throws ConfigError (without FILE:LINE) if a vehicle of this radius cannot reach most of the
 /// free space from the start; of a file's world, hardly anything.
-World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m);
+/// @param flown where the mission leads, along x and y from the start, m: what lies far from it may
+/// be coarser. Without it nothing is.
+World build_world(const WorldConfig& config, std::uint64_t seed, double vehicle_radius_m,
+                  const std::optional<Eigen::AlignedBox2d>& flown = {});
 
 /// Where there is ground to fly over, along x and y from the start, m: known without building.
 /// Nothing for a file, which has to be read.

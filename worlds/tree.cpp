@@ -59,8 +59,13 @@ Limb make_limb(RandomStream& random, const Vec3& base, Vec3 heading, const LimbS
 class Tree {
  public:
   Tree(MeshBuilder& builder, const TreeRecipe& recipe, const Vec3& root, const Allowed& allowed,
-       RandomStream random)
-      : builder_(builder), recipe_(recipe), root_(root), allowed_(allowed), random_(random) {
+       RandomStream random, Detail detail)
+      : builder_(builder),
+        recipe_(recipe),
+        root_(root),
+        allowed_(allowed),
+        random_(random),
+        coarse_(detail == Detail::kCoarse) {
     const double bark = kBarkReflectivity.draw(random_);
     trunk_object_ = builder_.add_object(SurfaceClass::kTrunk, bark);
     branch_object_ = builder_.add_object(SurfaceClass::kBranch, bark);
@@ -113,8 +118,7 @@ class Tree {
       trunk.points.push_back(trunk_axis(z));
       trunk.radii.push_back(trunk_radius(z));
     }
-    constexpr int kSides = 10;
-    builder_.add_tube(trunk_object_, trunk.points, trunk.radii, kSides);
+    builder_.add_tube(trunk_object_, trunk.points, trunk.radii, coarse_ ? 5 : 10);
     add_capsules(trunk_object_, trunk);
   }
 
@@ -167,15 +171,24 @@ class Tree {
       const double radius = std::max(twig_radius(), 0.6 * (twig_radius() + 0.005 * twig_length));
       const Limb twig = make_limb(random_, parent.at(t), (along + 0.9 * side).normalized(),
                                   {twig_length, radius, twig_radius(), 2, 0.12, 0.05});
-      if (add_branch(twig, 3) && leafy) leafy_.push_back(twig);
+      // In the air beside a coarse tree's straight branch, and thinner than is seen from afar.
+      const bool grown = coarse_ ? stands_free(twig) : add_branch(twig, 3);
+      if (grown && leafy) leafy_.push_back(twig);
     }
+  }
+
+  [[nodiscard]] bool stands_free(const Limb& limb) const {
+    return std::all_of(limb.points.begin(), limb.points.end(), allowed_);
   }
 
   /// Draws a limb and makes it solid, unless it enters a forbidden place.
   bool add_branch(const Limb& limb, int sides) {
-    if (!std::all_of(limb.points.begin(), limb.points.end(), allowed_)) return false;
-    builder_.add_tube(branch_object_, limb.points, limb.radii, sides);
-    add_capsules(branch_object_, limb);
+    if (!stands_free(limb)) return false;
+    const Limb straight{{limb.points.front(), limb.points.back()},
+                        {limb.radii.front(), limb.radii.back()}};
+    const Limb& drawn = coarse_ ? straight : limb;
+    builder_.add_tube(branch_object_, drawn.points, drawn.radii, coarse_ ? 3 : sides);
+    add_capsules(branch_object_, drawn);
     return true;
   }
 
@@ -194,7 +207,9 @@ class Tree {
     if (leafy_.empty()) return;
     // A crown's leaves grow with its surface, hence with the height squared.
     const double size = height_ / recipe_.height_m;
-    const int count = static_cast<int>(std::lround(recipe_.leaves * size * size));
+    const double merged = coarse_ ? kLeavesMerged : 1;
+    const double scale = std::sqrt(merged);
+    const int count = static_cast<int>(std::lround(recipe_.leaves * size * size / merged));
     constexpr double kSpread = 0.17;  // of a spray around its twig, standard deviation, m
     for (int i = 0; i < count; ++i) {
       const Limb& limb = leafy_[static_cast<std::size_t>(i) % leafy_.size()];
@@ -203,7 +218,7 @@ class Tree {
       const Vec3 normal = (0.75 * random_.normal3() + Vec3::UnitZ()).normalized();
       Vec3 along = limb.direction_at(t) + random_.normal3();
       along = (along - along.dot(normal) * normal).normalized();
-      const double length = recipe_.leaf_length_m * random_.uniform(0.7, 1.3);
+      const double length = scale * recipe_.leaf_length_m * random_.uniform(0.7, 1.3);
       const Vec3 across = 0.28 * length * normal.cross(along);
       const Vec3 middle = base + 0.45 * length * along;
       const Vec3 tip = base + length * along;
@@ -225,6 +240,7 @@ class Tree {
   Vec3 root_;
   const Allowed& allowed_;
   RandomStream random_;
+  bool coarse_;
   std::uint32_t trunk_object_ = 0, branch_object_ = 0, leaf_object_ = 0;
   double breast_radius_ = 0, height_ = 0;
   Vec2 lean_ = Vec2::Zero(), bow_ = Vec2::Zero(), sway_ = Vec2::Zero();
@@ -234,8 +250,8 @@ class Tree {
 }  // namespace
 
 void add_tree(MeshBuilder& builder, const TreeRecipe& recipe, const Vec3& root,
-              const Allowed& allowed, RandomStream random) {
-  Tree(builder, recipe, root, allowed, random).grow();
+              const Allowed& allowed, RandomStream random, Detail detail) {
+  Tree(builder, recipe, root, allowed, random, detail).grow();
 }
 
 }  // namespace arex::worlds

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 
 #include "math/random.h"
@@ -83,10 +84,18 @@ struct TreeRecipe {
 /// Whether wood and leaves may stand at a point of W.
 using Allowed = std::function<bool(const Vec3&)>;
 
+/// How closely a plant is drawn. A coarse one stands where the full one would, as thick and as
+/// high, with as much surface of leaves, in a sixth of its triangles: for what is only ever seen
+/// from afar.
+enum class Detail : std::uint8_t { kFull, kCoarse };
+/// So many leaves of a full plant are one of a coarse plant, of the same area.
+inline constexpr double kLeavesMerged = 6;
+
 /// Grows one tree at `root` (on the ground): trunk, branches and leaves are three objects. A branch
 /// that would enter a forbidden place is left out with all that it bears. Every piece of wood below
-/// 4 m above the root has collision capsules, above that the thicker ones only.
+/// 4 m above the root has collision capsules, above that the thicker ones only. A coarse tree's
+/// branches are straight, and its twigs only bear its leaves.
 void add_tree(MeshBuilder& builder, const TreeRecipe& recipe, const Vec3& root,
-              const Allowed& allowed, RandomStream random);
+              const Allowed& allowed, RandomStream random, Detail detail = Detail::kFull);
 
 }  // namespace arex::worlds

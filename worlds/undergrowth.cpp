@@ -12,7 +12,9 @@
 namespace arex::worlds {
 
 void add_shrub(MeshBuilder& builder, const Vec3& root, double height, int leaves,
-               RandomStream random) {
+               RandomStream random, Detail detail) {
+  const double merged = detail == Detail::kCoarse ? kLeavesMerged : 1;
+  leaves = static_cast<int>(std::lround(leaves / merged));
   const std::uint32_t object =
       builder.add_object(SurfaceClass::kShrub, kShrubReflectivity.draw(random));
   const int stems = random.uniform_int(3, 6);
@@ -40,7 +42,7 @@ void add_shrub(MeshBuilder& builder, const Vec3& root, double height, int leaves
     const Vec3 normal = (0.7 * random.normal3() + Vec3::UnitZ()).normalized();
     Vec3 along = base - root + 0.4 * random.normal3();
     along = (along - along.dot(normal) * normal).normalized();
-    const double length = random.uniform(0.08, 0.15);
+    const double length = std::sqrt(merged) * random.uniform(0.08, 0.15);
     const Vec3 across = 0.28 * length * normal.cross(along);
     const Vec3 middle = base + 0.45 * length * along;
     builder.add_quad(object, base, middle + across, base + length * along, middle - across);

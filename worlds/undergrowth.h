@@ -5,9 +5,10 @@
 
 namespace arex::worlds {
 
-/// A shrub of about this height: stems, each with a collision capsule, and leaves around them.
+/// A shrub of about this height: stems, each with a collision capsule, and leaves around them, so
+/// many of a full one.
 void add_shrub(MeshBuilder& builder, const Vec3& root, double height, int leaves,
-               RandomStream random);
+               RandomStream random, Detail detail = Detail::kFull);
 
 /// A fern: arching fronds of about this length, without collision shapes.
 void add_fern(MeshBuilder& builder, const Vec3& root, double length, RandomStream random);

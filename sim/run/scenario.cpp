@@ -106,6 +106,18 @@ void resolve_paths(const ConfigNode& node, worlds::WorldConfig& world) {
   }
 }
 
+Eigen::AlignedBox2d ScenarioConfig::flown_area() const {
+  Eigen::AlignedBox2d area(Vec2(0, 0));
+  const MissionConfig& mission = stack.mission;
+  const bool explores = mission.kind == MissionConfig::Kind::kExplore;
+  if (explores) area.extend(stack.exploration.explorer.bounds.extent());
+  for (const Vec3& p : explores ? mission.entry_m : mission.waypoints_m) area.extend(p.head<2>());
+  for (const OperatorOrder& order : commands) {
+    if (order.what == OperatorCommand::Kind::kGoTo) area.extend(order.goal_m.head<2>());
+  }
+  return area;
+}
+
 double ScenarioConfig::mapped_frames_hz() const {
   double frames = lidar.enabled ? lidar.model.rate_hz : 0;
   const auto depth_frames = [&](const DepthConfig& camera) {
@@ -140,7 +152,8 @@ worlds::World Scenario::build_world() const {
     world = file_world->world;
   } else {
     world = at_world(source, [&] {
-      return worlds::build_world(config.world, config.seed, load_airframe().radius_m);
+      return worlds::build_world(config.world, config.seed, load_airframe().radius_m,
+                                 config.flown_area());
     });
   }
   check_way(*this, world);

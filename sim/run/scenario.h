@@ -159,6 +159,8 @@ struct ScenarioConfig {
   }
   /// What an exploration is scored over: what it is told to explore.
   [[nodiscard]] ScoredRegion scored_region() const;
+  /// Where mission and operator lead, the start included: x and y in O, m.
+  [[nodiscard]] Eigen::AlignedBox2d flown_area() const;
 };
 
 /// A scenario as it was asked for.

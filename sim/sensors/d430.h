@@ -19,7 +19,7 @@ namespace arex::sim {
 /// when somebody reads it, on any thread, in any order. One frame at a time per device.
 class D430 {
  public:
-  /// The world is copied; it need not outlive this.
+  /// The world must outlive this.
   D430(const D430Config& config, const worlds::World& world, const Pose& X_BC, std::uint64_t seed);
 
   /// The frame taken at `stamp` with the body at X_WB.

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "sensors/renderer_culling.h"
+#include "sensors/renderer_mesh.h"
 
 namespace arex::sim {
 namespace {
@@ -28,9 +29,6 @@ Vector load(const Scalar* from) {
   return v;
 }
 
-constexpr std::uint32_t kClusterTriangles = 64;
-constexpr std::size_t kMostCorners = 3 * kClusterTriangles;
-
 // A triangle seen more nearly edge-on than this sine covers no pixel's centre, and its depth would
 // have no digits.
 constexpr double kEdgeOn = 1e-9;
@@ -39,16 +37,9 @@ constexpr double kBoundsMargin = 1e-6;
 // From this width on, each row's run between the edges is worth looking for, px.
 constexpr int kWide = 16;
 
-/// A few dozen triangles that lie close together, with corners of their own.
-struct Cluster {
-  std::uint32_t first_triangle = 0, triangle_count = 0;
-  std::uint32_t first_corner = 0, corner_count = 0;
-  bool closed = false;  ///< part of a solid: its far side is never seen
-};
-
 /// The corners of one cluster in C, m, and where they fall in the picture, px.
 struct Corners {
-  std::array<double, kMostCorners> x, y, z, u, v;
+  std::array<double, DepthChunk::kMostCorners> x, y, z, u, v;
   [[nodiscard]] Vec3 at(std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
@@ -64,42 +55,11 @@ struct Footprint {
   Vec3 inverse_depth;         ///< 1/z of its plane, 1/m
 };
 
-/// The world's mesh in clusters, corners split by coordinate.
-struct DepthMesh {
-  std::vector<Cluster> clusters;
-  std::vector<worlds::Chunk> bounds;                   ///< of each cluster, for culling
-  std::vector<float> x, y, z;                          ///< corners in W, m
-  std::vector<std::array<std::uint8_t, 3>> triangles;  ///< corners, counted within the cluster
-  std::vector<std::uint32_t> source;                   ///< of each triangle: its index in the mesh
-
-  explicit DepthMesh(const worlds::Mesh& mesh) {
-    ClusteredMesh clustered = cluster_mesh(mesh, kClusterTriangles);
-    bounds = clustered.clusters;
-    source = std::move(clustered.source);
-    constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-    std::vector<std::uint32_t> corner_of(clustered.vertices.size(), kUnused);
-    for (std::size_t i = 0; i < bounds.size(); ++i) {
-      Cluster cluster{bounds[i].first_triangle, bounds[i].triangle_count,
-                      static_cast<std::uint32_t>(x.size()), 0, clustered.closed[i]};
-      for (std::uint32_t k = 0; k < cluster.triangle_count; ++k) {
-        std::array<std::uint8_t, 3> triangle{};
-        for (std::size_t j = 0; j < 3; ++j) {
-          const std::uint32_t vertex = clustered.triangles[cluster.first_triangle + k][j];
-          // Numbers below first_corner are an earlier cluster's.
-          if (corner_of[vertex] == kUnused || corner_of[vertex] < cluster.first_corner) {
-            corner_of[vertex] = static_cast<std::uint32_t>(x.size());
-            x.push_back(clustered.vertices[vertex].x());
-            y.push_back(clustered.vertices[vertex].y());
-            z.push_back(clustered.vertices[vertex].z());
-          }
-          triangle[j] = static_cast<std::uint8_t>(corner_of[vertex] - cluster.first_corner);
-        }
-        triangles.push_back(triangle);
-      }
-      cluster.corner_count = static_cast<std::uint32_t>(x.size()) - cluster.first_corner;
-      clusters.push_back(cluster);
-    }
-  }
+/// A cluster that may be seen; nearer ones come first, of equally near ones the first in the mesh.
+struct Seen {
+  double depth = 0;
+  std::uint32_t chunk = 0, cluster = 0;
+  auto operator<=>(const Seen&) const = default;
 };
 
 }  // namespace
@@ -122,8 +82,9 @@ struct Renderer::Impl {
   void draw_all(const Pose& X_WC);
   void crop(std::vector<float>& out) const;
   template <Content content>
-  void draw(const Cluster& cluster, const Pose& X_CW);
-  void place(const Cluster& cluster, const Pose& X_CW);
+  void draw(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW);
+  void place(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW);
+  [[nodiscard]] std::vector<Seen> visible(const Pose& X_WC);
   [[nodiscard]] Box box_of(std::size_t a, std::size_t b, std::size_t c) const;
   [[nodiscard]] bool footprint(const Vec3& a, const Vec3& b, const Vec3& c, bool closed,
                                Footprint& out) const;
@@ -144,12 +105,12 @@ struct Renderer::Impl {
 };
 
 /// Brings a cluster's corners into C and into the picture.
-void Renderer::Impl::place(const Cluster& cluster, const Pose& X_CW) {
+void Renderer::Impl::place(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW) {
   const Mat3& R = X_CW.R;
   const Vec3& p = X_CW.p;
-  const float* x = &mesh.x[cluster.first_corner];
-  const float* y = &mesh.y[cluster.first_corner];
-  const float* z = &mesh.z[cluster.first_corner];
+  const float* x = &chunk.x[cluster.first_corner];
+  const float* y = &chunk.y[cluster.first_corner];
+  const float* z = &chunk.z[cluster.first_corner];
   for (std::size_t i = 0; i < cluster.corner_count; ++i) {
     const double x_W = x[i], y_W = y[i], z_W = z[i];
     corners.x[i] = R(0, 0) * x_W + R(0, 1) * y_W + R(0, 2) * z_W + p.x();
@@ -244,37 +205,57 @@ void Renderer::Impl::fill(const Footprint& footprint, const Box& box, std::uint3
 }
 
 template <Renderer::Impl::Content content>
-void Renderer::Impl::draw(const Cluster& cluster, const Pose& X_CW) {
-  place(cluster, X_CW);
+void Renderer::Impl::draw(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW) {
+  place(chunk, cluster, X_CW);
   Footprint footprint_of_triangle;
-  for (std::uint32_t i = 0; i < cluster.triangle_count; ++i) {
-    const auto& [a, b, c] = mesh.triangles[cluster.first_triangle + i];
+  for (std::uint32_t i = 0; i < cluster.part.triangle_count; ++i) {
+    const std::uint32_t triangle = cluster.part.first_triangle + i;
+    const auto& [a, b, c] = chunk.triangles[triangle];
     const Box box = box_of(a, b, c);
     if (box.empty()) continue;
     if (!footprint(corners.at(a), corners.at(b), corners.at(c), cluster.closed,
                    footprint_of_triangle)) {
       continue;
     }
-    fill<content>(footprint_of_triangle, box, mesh.source[cluster.first_triangle + i]);
+    fill<content>(footprint_of_triangle, box, chunk.source[triangle]);
   }
+}
+
+/// The clusters to draw, in their order.
+std::vector<Seen> Renderer::Impl::visible(const Pose& X_WC) {
+  std::vector<Seen> found;
+  const ViewVolume view(camera, X_WC, options.far_m);
+  for (std::uint32_t i = 0; i < mesh.bounds().size(); ++i) {
+    const bool empty = mesh.bounds()[i].triangle_count == 0;
+    if (empty || (options.cull && !view.touches(mesh.bounds()[i].bounds))) continue;
+    const std::vector<Cluster>& clusters = mesh.chunk(i).clusters;
+    for (std::uint32_t k = 0; k < clusters.size(); ++k) {
+      const Eigen::AlignedBox3f& bounds = clusters[k].part.bounds;
+      if (!options.cull) {
+        found.push_back({0, i, k});
+      } else if (view.touches(bounds)) {
+        found.push_back({view.nearest_depth(bounds), i, k});
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 template <Renderer::Impl::Content content>
 void Renderer::Impl::draw_all(const Pose& X_WC) {
-  std::vector<std::uint32_t> visible(mesh.clusters.size());
-  std::iota(visible.begin(), visible.end(), 0U);
-  if (options.cull) {
-    visible = visible_chunks(mesh.bounds, ViewVolume(camera, X_WC, options.far_m));
-  }
+  const std::vector<Seen> clusters = visible(X_WC);
   const std::size_t pixels =
       static_cast<std::size_t>(stride) * static_cast<std::size_t>(camera.height);
   picture.assign(pixels, 0.0F);
   if (content == Content::kTriangles) seen.assign(pixels, kNoTriangle);
-  last_frame = {visible.size(), 0};
+  last_frame = {clusters.size(), 0};
   const Pose X_CW = X_WC.inverse();
-  for (const std::uint32_t i : visible) {
-    draw<content>(mesh.clusters[i], X_CW);
-    last_frame.triangles += mesh.clusters[i].triangle_count;
+  for (const Seen& seen_cluster : clusters) {
+    const DepthChunk& chunk = mesh.chunk(seen_cluster.chunk);
+    const Cluster& cluster = chunk.clusters[seen_cluster.cluster];
+    draw<content>(chunk, cluster, X_CW);
+    last_frame.triangles += cluster.part.triangle_count;
   }
 }
 

@@ -36,8 +36,9 @@ class Renderer {
     std::size_t triangles = 0;
   };
 
-  /// The world is copied; it need not outlive the renderer.
+  /// The world must outlive the renderer: what is looked at first is prepared then.
   Renderer(const worlds::World& world, const PinholeCamera& camera, const RendererOptions& options);
+  Renderer(worlds::World&&, const PinholeCamera&, const RendererOptions&) = delete;
   ~Renderer();
 
   /// 1/z of the nearest surface in each pixel (1/m; z the depth in C), rows from the top, 0 where

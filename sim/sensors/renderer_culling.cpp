@@ -4,6 +4,7 @@
 #include <array>
 #include <compare>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace arex::sim {
@@ -41,8 +42,7 @@ std::uint32_t morton_code(const Vec3f& p, const Eigen::AlignedBox3f& bounds) {
 /// Triangles that hang together by shared vertices, each such surface named by one of its vertices.
 class Surfaces {
  public:
-  explicit Surfaces(const worlds::Mesh& mesh)
-      : parent_(mesh.vertices.size()), triangle_count_(mesh.vertices.size(), 0) {
+  explicit Surfaces(const worlds::Mesh& mesh) : mesh_(mesh), parent_(mesh.vertices.size()) {
     std::iota(parent_.begin(), parent_.end(), 0U);
     for (const auto& [a, b, c] : mesh.triangles) {
       parent_[find(b)] = find(a);
@@ -50,11 +50,24 @@ class Surfaces {
     }
     for (std::uint32_t vertex = 0; vertex < parent_.size(); ++vertex)
       parent_[vertex] = find(vertex);
-    for (const auto& triangle : mesh.triangles) ++triangle_count_[of(triangle[0])];
   }
-  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) const { return parent_[vertex]; }
-  [[nodiscard]] std::uint32_t triangle_count(std::uint32_t vertex) const {
-    return triangle_count_[of(vertex)];
+
+  /// Hands over each surface's triangles, ascending, and its name.
+  template <class Visit>
+  void each(const Visit& visit) const {
+    std::vector<std::uint32_t> end(parent_.size() + 1, 0);
+    for (const auto& triangle : mesh_.triangles) ++end[parent_[triangle[0]] + 1];
+    for (std::size_t vertex = 0; vertex < parent_.size(); ++vertex) end[vertex + 1] += end[vertex];
+    std::vector<std::uint32_t> grouped(mesh_.triangles.size());
+    for (std::uint32_t t = 0; t < grouped.size(); ++t) {
+      grouped[end[parent_[mesh_.triangles[t][0]]]++] = t;
+    }
+    // What began where the one before ended now ends there itself.
+    for (std::uint32_t vertex = 0, first = 0; vertex < parent_.size(); ++vertex) {
+      const std::uint32_t last = end[vertex];
+      if (last > first) visit(std::span(grouped).subspan(first, last - first), vertex);
+      first = last;
+    }
   }
 
  private:
@@ -62,7 +75,8 @@ class Surfaces {
     while (parent_[vertex] != vertex) vertex = parent_[vertex] = parent_[parent_[vertex]];
     return vertex;
   }
-  std::vector<std::uint32_t> parent_, triangle_count_;
+  const worlds::Mesh& mesh_;
+  std::vector<std::uint32_t> parent_;
 };
 
 /// One triangle's run along an edge, from its lower to its higher vertex or back.
@@ -86,6 +100,78 @@ double signed_volume(const worlds::Mesh& mesh, std::uint32_t triangle, const Vec
   const Vec3 r = (mesh.vertices[c] - apex).cast<double>();
   return p.dot(q.cross(r));
 }
+
+/// The winding of one surface after the other; triangles are counted within theirs.
+class WindingOfSurface {
+ public:
+  explicit WindingOfSurface(const worlds::Mesh& mesh) : mesh_(mesh) {}
+
+  /// Sets that of one surface's triangles; 0 stays where it is open.
+  void find(std::span<const std::uint32_t> triangles, std::uint32_t vertex,
+            std::vector<std::int8_t>& winding) {
+    if (!match_edges(triangles)) return;
+    // Carry one triangle's winding over its surface; the sign of the volume tells in from out.
+    local_.assign(triangles.size(), 0);
+    for (std::uint32_t seed = 0; seed < triangles.size(); ++seed) {
+      if (local_[seed] != 0) continue;
+      reached_.assign(1, seed);
+      local_[seed] = 1;
+      double volume = 0;
+      bool orientable = true;
+      for (std::size_t i = 0; i < reached_.size(); ++i) {
+        const std::uint32_t t = reached_[i];
+        volume += local_[t] * signed_volume(mesh_, triangles[t], mesh_.vertices[vertex]);
+        for (const Neighbour& next : neighbours_[t]) {
+          const auto expected = static_cast<std::int8_t>(next.flipped ? -local_[t] : local_[t]);
+          if (local_[next.triangle] == 0) {
+            local_[next.triangle] = expected;
+            reached_.push_back(next.triangle);
+          }
+          orientable = orientable && local_[next.triangle] == expected;
+        }
+      }
+      const int sign = !orientable || volume == 0 ? 0 : volume > 0 ? 1 : -1;
+      for (const std::uint32_t t : reached_) {
+        winding[triangles[t]] = static_cast<std::int8_t>(local_[t] * sign);
+      }
+      if (sign == 0) return;  // the rest of such a surface counts as open
+    }
+  }
+
+ private:
+  /// @return whether each edge bounds exactly two triangles
+  bool match_edges(std::span<const std::uint32_t> triangles) {
+    sides_.clear();
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      const auto& corners = mesh_.triangles[triangles[t]];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint64_t from = corners[k], to = corners[(k + 1) % 3];
+        sides_.push_back({std::min(from, to) << 32U | std::max(from, to), t, from < to});
+      }
+    }
+    std::sort(sides_.begin(), sides_.end());
+    neighbours_.assign(triangles.size(), {});
+    filled_.assign(triangles.size(), 0);
+    for (std::size_t i = 0; i < sides_.size(); i += 2) {
+      const bool pair = i + 1 < sides_.size() && sides_[i].edge == sides_[i + 1].edge;
+      const bool more = i + 2 < sides_.size() && sides_[i].edge == sides_[i + 2].edge;
+      if (!pair || more) return false;
+      const EdgeSide &a = sides_[i], &b = sides_[i + 1];
+      // Two triangles that run along their edge in the same direction are wound differently.
+      const bool flipped = a.forward == b.forward;
+      neighbours_[a.triangle][filled_[a.triangle]++] = {b.triangle, flipped};
+      neighbours_[b.triangle][filled_[b.triangle]++] = {a.triangle, flipped};
+    }
+    return true;
+  }
+
+  const worlds::Mesh& mesh_;
+  std::vector<EdgeSide> sides_;
+  std::vector<std::array<Neighbour, 3>> neighbours_;
+  std::vector<std::uint8_t> filled_;
+  std::vector<std::int8_t> local_;
+  std::vector<std::uint32_t> reached_;
+};
 
 }  // namespace
 
@@ -118,110 +204,47 @@ double ViewVolume::nearest_depth(const Eigen::AlignedBox3f& box) const {
 }
 
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh) {
-  const Surfaces surfaces(mesh);
-  std::vector<EdgeSide> sides;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    constexpr std::uint32_t kFewestOfASolid = 4;
-    if (surfaces.triangle_count(mesh.triangles[t][0]) < kFewestOfASolid) continue;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint64_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
-      sides.push_back({std::min(from, to) << 32U | std::max(from, to), t, from < to});
-    }
-  }
-  std::sort(sides.begin(), sides.end());
-  // Two triangles that run along their edge in the same direction are wound differently.
-  std::vector<bool> open(mesh.vertices.size(), false);
-  std::vector<std::array<Neighbour, 3>> neighbours(mesh.triangles.size());
-  std::vector<std::uint8_t> filled(mesh.triangles.size(), 0);
-  for (std::size_t i = 0; i < sides.size();) {
-    std::size_t end = i + 1;
-    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
-    const EdgeSide& a = sides[i];
-    const EdgeSide& b = sides[end - 1];
-    if (end - i == 2) {
-      const bool flipped = a.forward == b.forward;
-      neighbours[a.triangle][filled[a.triangle]++] = {b.triangle, flipped};
-      neighbours[b.triangle][filled[b.triangle]++] = {a.triangle, flipped};
-    } else {
-      open[surfaces.of(mesh.triangles[a.triangle][0])] = true;
-    }
-    i = end;
-  }
-  // Carry one triangle's winding over its surface; the sign of the volume tells in from out.
   std::vector<std::int8_t> winding(mesh.triangles.size(), 0);
-  std::vector<std::uint32_t> reached;
-  for (std::uint32_t seed = 0; seed < winding.size(); ++seed) {
-    const std::uint32_t surface = surfaces.of(mesh.triangles[seed][0]);
-    if (winding[seed] != 0 || filled[seed] != 3 || open[surface]) continue;
-    reached.assign(1, seed);
-    winding[seed] = 1;
-    double volume = 0;
-    bool orientable = true;
-    for (std::size_t i = 0; i < reached.size(); ++i) {
-      const std::uint32_t t = reached[i];
-      volume += winding[t] * signed_volume(mesh, t, mesh.vertices[surface]);
-      for (const Neighbour& next : neighbours[t]) {
-        const auto expected = static_cast<std::int8_t>(next.flipped ? -winding[t] : winding[t]);
-        if (winding[next.triangle] == 0) {
-          winding[next.triangle] = expected;
-          reached.push_back(next.triangle);
-        }
-        orientable = orientable && winding[next.triangle] == expected;
-      }
-    }
-    const int sign = !orientable || volume == 0 ? 0 : volume > 0 ? 1 : -1;
-    for (const std::uint32_t t : reached) winding[t] = static_cast<std::int8_t>(winding[t] * sign);
-    if (sign == 0) open[surface] = true;
-  }
+  const Surfaces surfaces(mesh);
+  WindingOfSurface of_surface(mesh);
+  surfaces.each([&](std::span<const std::uint32_t> triangles, std::uint32_t vertex) {
+    constexpr std::size_t kFewestOfASolid = 4;
+    if (triangles.size() >= kFewestOfASolid) of_surface.find(triangles, vertex, winding);
+  });
   return winding;
 }
 
-ClusteredMesh cluster_mesh(const worlds::Mesh& mesh, std::uint32_t max_triangles) {
-  ClusteredMesh out;
-  out.triangles.reserve(mesh.triangles.size());
-  out.source.reserve(mesh.triangles.size());
-  out.vertices.reserve(mesh.vertices.size());
-  constexpr std::uint32_t kUnused = 0xFFFFFFFFU;
-  std::vector<std::uint32_t> new_index(mesh.vertices.size(), kUnused);
-  const std::vector<std::int8_t> winding = outward_winding(mesh);
-
+ClusteredChunk cluster_chunk(const worlds::Mesh& mesh, const worlds::Chunk& chunk,
+                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles) {
+  ClusteredChunk out;
+  out.triangles.reserve(chunk.triangle_count);
+  out.source.reserve(chunk.triangle_count);
   const auto add_to_last_cluster = [&](std::uint32_t source) {
     worlds::Chunk& cluster = out.clusters.back();
     std::array<std::uint32_t, 3> triangle = mesh.triangles[source];
     if (winding[source] < 0) std::swap(triangle[1], triangle[2]);
-    for (std::uint32_t& vertex : triangle) {
-      const Vec3f& p = mesh.vertices[vertex];
-      cluster.bounds.extend(p);
-      if (new_index[vertex] == kUnused) {
-        new_index[vertex] = static_cast<std::uint32_t>(out.vertices.size());
-        out.vertices.push_back(p);
-      }
-      vertex = new_index[vertex];
-    }
+    for (const std::uint32_t vertex : triangle) cluster.bounds.extend(mesh.vertices[vertex]);
     out.triangles.push_back(triangle);
     out.source.push_back(source);
     ++cluster.triangle_count;
   };
-
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // Morton code, triangle
-  for (const worlds::Chunk& chunk : mesh.chunks) {
-    for (const bool closed : {true, false}) {
-      order.clear();
-      for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
-        const std::uint32_t triangle = chunk.first_triangle + i;
-        if ((winding[triangle] != 0) != closed) continue;
-        const auto& [a, b, c] = mesh.triangles[triangle];
-        const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
-        order.emplace_back(morton_code(centroid, chunk.bounds), triangle);
+  for (const bool closed : {true, false}) {
+    order.clear();
+    for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
+      const std::uint32_t triangle = chunk.first_triangle + i;
+      if ((winding[triangle] != 0) != closed) continue;
+      const auto& [a, b, c] = mesh.triangles[triangle];
+      const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
+      order.emplace_back(morton_code(centroid, chunk.bounds), triangle);
+    }
+    std::sort(order.begin(), order.end());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (i % max_triangles == 0) {
+        out.clusters.push_back({static_cast<std::uint32_t>(out.triangles.size()), 0, {}});
+        out.closed.push_back(closed);
       }
-      std::sort(order.begin(), order.end());
-      for (std::size_t i = 0; i < order.size(); ++i) {
-        if (i % max_triangles == 0) {
-          out.clusters.push_back({static_cast<std::uint32_t>(out.triangles.size()), 0, {}});
-          out.closed.push_back(closed);
-        }
-        add_to_last_cluster(order[i].second);
-      }
+      add_to_last_cluster(order[i].second);
     }
   }
   return out;

@@ -35,19 +35,20 @@ class ViewVolume {
 /// triangles and it has an inside. The mesh's own winding does not matter.
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh);
 
-/// A mesh cut finer than its chunks, for culling: a view touches the clusters it needs and few
-/// more.
-struct ClusteredMesh {
-  std::vector<Vec3f> vertices;  ///< in W, in the order of their first use
-  /// The mesh's own, grouped by cluster; those of closed surfaces counter-clockwise from outside.
+/// A chunk of a mesh cut finer, for culling: a view touches the clusters it needs and few more.
+struct ClusteredChunk {
+  /// The chunk's own, grouped by cluster, corners as in the mesh; those of closed surfaces
+  /// counter-clockwise from outside.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint32_t> source;    ///< of each triangle: its index in the mesh
-  std::vector<worlds::Chunk> clusters;  ///< cover all triangles once, in order
+  std::vector<worlds::Chunk> clusters;  ///< cover the chunk's triangles once, in order
   std::vector<bool> closed;             ///< of each cluster: all its triangles bound solids
 };
 
-/// Each chunk's triangles along a Morton curve, cut into runs of at most `max_triangles`.
-ClusteredMesh cluster_mesh(const worlds::Mesh& mesh, std::uint32_t max_triangles);
+/// The chunk's triangles along a Morton curve, cut into runs of at most `max_triangles`.
+/// @param winding that of the mesh
+ClusteredChunk cluster_chunk(const worlds::Mesh& mesh, const worlds::Chunk& chunk,
+                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles);
 
 /// Indices of the chunks or clusters that may be seen, nearest first (ties by index).
 std::vector<std::uint32_t> visible_chunks(const std::vector<worlds::Chunk>& chunks,

@@ -26,12 +26,48 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// A world of more triangles than this is kept small instead of fast.
+constexpr std::size_t kLarge = 2'000'000;
+
 /// All that a hit needs of its triangle, one cache line.
 struct alignas(64) Facet {
   std::array<Vec3f, 3> corners_W;
   Vec3f normal_W = Vec3f::Zero();  ///< unit
   float reflectivity = 0;
   std::uint32_t object = Hit::kNone;
+};
+
+/// The triangles, and what there is to know of each.
+struct Facets {
+  const Vec3f* vertices = nullptr;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> object_of_triangle;
+  std::vector<worlds::Object> objects;
+  std::vector<Facet> lines;  ///< one per triangle; of a large world none
+
+  [[nodiscard]] std::array<Vec3f, 3> corners(std::uint32_t triangle) const {
+    if (!lines.empty()) return lines[triangle].corners_W;
+    const auto& [a, b, c] = triangles[triangle];
+    return {vertices[a], vertices[b], vertices[c]};
+  }
+  [[nodiscard]] Facet at(std::uint32_t triangle) const {
+    return lines.empty() ? make(triangle) : lines[triangle];
+  }
+  [[nodiscard]] Facet make(std::uint32_t triangle) const {
+    const auto& [ia, ib, ic] = triangles[triangle];
+    const Vec3 a = vertices[ia].cast<double>();
+    const Vec3 b = vertices[ib].cast<double>();
+    const Vec3 c = vertices[ic].cast<double>();
+    Facet facet;
+    facet.corners_W = {vertices[ia], vertices[ib], vertices[ic]};
+    facet.normal_W = (b - a).cross(c - a).normalized().cast<float>();
+    facet.object = object_of_triangle[triangle];
+    facet.reflectivity = objects[facet.object].reflectivity;
+    return facet;
+  }
+  void prefetch(std::uint32_t triangle) const {
+    if (!lines.empty()) __builtin_prefetch(&lines[triangle]);
+  }
 };
 
 /// By how much Embree may be wrong about a distance.
@@ -52,11 +88,11 @@ struct Search {
   std::size_t count = 0;
   std::array<std::uint32_t, 4> candidates{};
 
-  [[nodiscard]] Meeting at(std::uint32_t triangle, const std::vector<Facet>& facets) const {
-    return {distance_along(o, d, facets[triangle].corners_W), triangle};
+  [[nodiscard]] Meeting at(std::uint32_t triangle, const Facets& facets) const {
+    return {distance_along(o, d, facets.corners(triangle)), triangle};
   }
   /// The first of the candidates, from the start of the ray to its end.
-  [[nodiscard]] Meeting first(const std::vector<Facet>& facets) const {
+  [[nodiscard]] Meeting first(const Facets& facets) const {
     Meeting best{to, Hit::kNone};
     for (std::size_t i = 0; i < count; ++i) {
       const Meeting meeting = at(candidates[i], facets);
@@ -65,7 +101,7 @@ struct Search {
     return best;
   }
   /// Takes a triangle that the ray meets at Embree's distance t. @return whether it is the nearest
-  bool note(std::uint32_t triangle, float t, const std::vector<Facet>& facets) {
+  bool note(std::uint32_t triangle, float t, const Facets& facets) {
     const bool at_start = t <= static_cast<float>(from) + widening(t);
     if (at_start && at(triangle, facets).distance < from) return false;
     if (t + widening(t) < nearest) count = 0;  // all others lie behind it
@@ -83,7 +119,7 @@ struct Search {
 
 struct Packet {
   RTCIntersectContext context{};  ///< the first member: what Embree hands to note_all()
-  const std::vector<Facet>* facets = nullptr;
+  const Facets* facets = nullptr;
   std::array<Search, kPacket> searches{};
 };
 
@@ -104,19 +140,19 @@ struct NearestQuery {
   Vec3 p_W;
   double best_m;
   worlds::ClassSet classes;
-  const worlds::SurfaceClass* class_of_triangle;
-  const Vec3f* vertices;
-  const Triangle* triangles;
+  const Facets* facets;
 };
 
 /// Embree calls this for every triangle whose bounds reach into the query's sphere.
 bool visit_triangle(RTCPointQueryFunctionArguments* args) {
   auto& nearest = *static_cast<NearestQuery*>(args->userPtr);
-  if (!nearest.classes.contains(nearest.class_of_triangle[args->primID])) return false;
-  const Triangle& t = nearest.triangles[args->primID];
-  const Vec3 a = nearest.vertices[t[0]].cast<double>();
-  const Vec3 b = nearest.vertices[t[1]].cast<double>();
-  const Vec3 c = nearest.vertices[t[2]].cast<double>();
+  const Facets& facets = *nearest.facets;
+  const std::uint32_t object = facets.object_of_triangle[args->primID];
+  if (!nearest.classes.contains(facets.objects[object].surface_class)) return false;
+  const std::array<Vec3f, 3> corners = facets.corners(args->primID);
+  const Vec3 a = corners[0].cast<double>();
+  const Vec3 b = corners[1].cast<double>();
+  const Vec3 c = corners[2].cast<double>();
   const double distance = (worlds::nearest_on_triangle(nearest.p_W, a, b, c) - nearest.p_W).norm();
   if (distance >= nearest.best_m) return false;
   nearest.best_m = distance;
@@ -133,10 +169,7 @@ void fail_loudly(void*, RTCError, const char* message) {
 struct Scene::Embree {
   RTCDevice device = nullptr;
   RTCBuffer vertex_buffer = nullptr;
-  std::vector<Facet> facets;  ///< one per triangle of the mesh
-  const Vec3f* vertices = nullptr;
-  std::vector<Triangle> triangles;
-  std::vector<worlds::SurfaceClass> class_of_triangle;
+  Facets facets;
   RTCScene scene = nullptr;
   std::shared_future<void> built;
 
@@ -150,9 +183,14 @@ struct Scene::Embree {
     vertex_buffer = rtcNewBuffer(device, (source.size() + 2) * sizeof(Vec3f));
     auto* copied = static_cast<Vec3f*>(rtcGetBufferData(vertex_buffer));
     std::copy(source.begin(), source.end(), copied);
-    vertices = copied;
-    triangles = world.mesh.triangles;
-    make_facets(world);
+    facets.vertices = copied;
+    facets.triangles = world.mesh.triangles;
+    facets.object_of_triangle = world.mesh.object_of_triangle;
+    facets.objects = world.objects;
+    if (facets.triangles.size() <= kLarge) {
+      facets.lines.resize(facets.triangles.size());
+      for (std::uint32_t t = 0; t < facets.lines.size(); ++t) facets.lines[t] = facets.make(t);
+    }
     attach(source.size());
     const bool beside = build == Build::kBeside;
     built = std::async(beside ? std::launch::async : std::launch::deferred,
@@ -178,36 +216,22 @@ struct Scene::Embree {
     scene = rtcNewScene(device);
     // Robust: a box or a triangle that a ray grazes is searched, not missed.
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
-    if (triangles.empty()) return;
+    const bool large = facets.triangles.size() > kLarge;
+    const RTCBuildQuality quality = large ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
+    rtcSetSceneBuildQuality(scene, quality);
+    if (facets.triangles.empty()) return;
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+    rtcSetGeometryBuildQuality(geometry, quality);
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertex_buffer, 0,
                          sizeof(Vec3f), vertex_count);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                               triangles.data(), 0, sizeof(Triangle), triangles.size());
+                               facets.triangles.data(), 0, sizeof(Triangle),
+                               facets.triangles.size());
     rtcSetGeometryPointQueryFunction(geometry, visit_triangle);
     rtcSetGeometryIntersectFilterFunction(geometry, note_all);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
-  }
-
-  void make_facets(const worlds::World& world) {
-    facets.resize(triangles.size());
-    class_of_triangle.resize(triangles.size());
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      const Triangle& t = triangles[i];
-      const Vec3 a = vertices[t[0]].cast<double>();
-      const Vec3 b = vertices[t[1]].cast<double>();
-      const Vec3 c = vertices[t[2]].cast<double>();
-      Facet& facet = facets[i];
-      facet.corners_W = {vertices[t[0]], vertices[t[1]], vertices[t[2]]};
-      facet.normal_W = (b - a).cross(c - a).normalized().cast<float>();
-      facet.object = world.mesh.object_of_triangle[i];
-      class_of_triangle[i] = world.class_of_triangle(i);
-      facet.reflectivity = world.objects[facet.object].reflectivity;
-    }
   }
 
   /// The nearest triangle of each of at most kPacket rays, kNone where there is none, and how far
@@ -243,7 +267,7 @@ struct Scene::Embree {
     rtcInitIntersectContext(&packet.context);
     rtcIntersect8(active.data(), tree, &packet.context, &query);
     for (const Search& search : packet.searches) {
-      if (search.count > 0) __builtin_prefetch(&facets[search.candidates[0]]);
+      if (search.count > 0) facets.prefetch(search.candidates[0]);
     }
     for (std::size_t i = 0; i < rays.size(); ++i) found[i] = packet.searches[i].first(facets);
   }
@@ -270,7 +294,7 @@ Hit Scene::cast(const Vec3& origin_W, const Vec3& direction_W, double max_distan
   Meeting meeting;
   embree_->cast_packet(embree_->tree(), {&ray, 1}, {&meeting, 1});
   if (meeting.triangle == Hit::kNone) return {};
-  const Facet& facet = embree_->facets[meeting.triangle];
+  const Facet facet = embree_->facets.at(meeting.triangle);
   Hit hit;
   hit.distance_m = meeting.distance;
   hit.normal_W = facet.normal_W.cast<double>().normalized();
@@ -290,7 +314,7 @@ void Scene::cast(std::span<const Ray> rays, std::span<RayHit> hits) const {
       RayHit& hit = hits[first + i];
       hit = {};
       if (met[i].triangle == Hit::kNone) continue;
-      const Facet& facet = embree_->facets[met[i].triangle];
+      const Facet facet = embree_->facets.at(met[i].triangle);
       hit = {static_cast<float>(met[i].distance), facet.normal_W, facet.reflectivity, facet.object};
     }
   }
@@ -298,12 +322,7 @@ void Scene::cast(std::span<const Ray> rays, std::span<RayHit> hits) const {
 
 double Scene::distance_to_surface(const Vec3& p_W, double max_distance_m,
                                   worlds::ClassSet classes) const {
-  NearestQuery nearest{p_W,
-                       max_distance_m,
-                       classes,
-                       embree_->class_of_triangle.data(),
-                       embree_->vertices,
-                       embree_->triangles.data()};
+  NearestQuery nearest{p_W, max_distance_m, classes, &embree_->facets};
   RTCPointQuery query;
   query.x = static_cast<float>(p_W.x());
   query.y = static_cast<float>(p_W.y());

@@ -45,28 +45,31 @@ TEST(ViewVolume, TouchesEveryBoxThatHoldsAPointInView) {
   EXPECT_GT(rejected, 2500);  // and culling culls
 }
 
-TEST(ClusterMesh, KeepsEveryTriangleOnceWithinItsClustersBounds) {
+TEST(ClusterChunk, KeepsEveryTriangleOnceWithinItsClustersBounds) {
   const worlds::World world = small_forest(3);
-  const ClusteredMesh clustered = cluster_mesh(world.mesh, 64);
-  ASSERT_EQ(clustered.triangles.size(), world.mesh.triangles.size());
-  const std::set<std::uint32_t> sources(clustered.source.begin(), clustered.source.end());
-  EXPECT_EQ(sources.size(), world.mesh.triangles.size());
-  std::uint32_t next = 0;
-  for (const worlds::Chunk& cluster : clustered.clusters) {
-    EXPECT_EQ(cluster.first_triangle, next);
-    EXPECT_LE(cluster.triangle_count, 64U);
-    next += cluster.triangle_count;
-    for (std::uint32_t t = cluster.first_triangle; t < next; ++t) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3f& p = clustered.vertices[clustered.triangles[t][k]];
-        EXPECT_TRUE(cluster.bounds.contains(p));
+  const std::vector<std::int8_t> winding = outward_winding(world.mesh);
+  std::set<std::uint32_t> sources;
+  for (const worlds::Chunk& chunk : world.mesh.chunks) {
+    const ClusteredChunk clustered = cluster_chunk(world.mesh, chunk, winding, 64);
+    ASSERT_EQ(clustered.triangles.size(), chunk.triangle_count);
+    std::uint32_t next = 0;
+    for (const worlds::Chunk& cluster : clustered.clusters) {
+      EXPECT_EQ(cluster.first_triangle, next);
+      EXPECT_LE(cluster.triangle_count, 64U);
+      next += cluster.triangle_count;
+      for (std::uint32_t t = cluster.first_triangle; t < next; ++t) {
+        EXPECT_TRUE(sources.insert(clustered.source[t]).second);
         const auto& source = world.mesh.triangles[clustered.source[t]];
-        EXPECT_TRUE(std::any_of(source.begin(), source.end(),
-                                [&](auto vertex) { return world.mesh.vertices[vertex] == p; }));
+        EXPECT_TRUE(
+            std::is_permutation(source.begin(), source.end(), clustered.triangles[t].begin()));
+        for (const std::uint32_t vertex : source) {
+          EXPECT_TRUE(cluster.bounds.contains(world.mesh.vertices[vertex]));
+        }
       }
     }
+    EXPECT_EQ(next, chunk.triangle_count);
   }
-  EXPECT_EQ(next, world.mesh.triangles.size());
+  EXPECT_EQ(sources.size(), world.mesh.triangles.size());
 }
 
 TEST(OutwardWinding, TellsSolidsFromSheetsWhateverTheirWinding) {

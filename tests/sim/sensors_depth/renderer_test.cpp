@@ -49,7 +49,8 @@ TEST(Renderer, DepthOfAPlaneIsExactToATenthOfAMillimetre) {
     for (const double x : {0.3, 2.0, 9.5}) {
       const Vec3 normal = so3::Exp({0, 0.3 * tilt, tilt}) * Vec3::UnitX();
       const Vec3 point(x, 0, 0);
-      Renderer renderer(plane_world(point, normal, 100), kCamera, {});
+      const worlds::World world = plane_world(point, normal, 100);
+      Renderer renderer(world, kCamera, {});
       std::vector<float> inverse_depth;
       const Pose X_WC = forward_camera();
       renderer.render_inverse_depth(X_WC, inverse_depth);
@@ -164,7 +165,8 @@ worlds::World shell(int slices, int stacks, double radius_m, RandomStream& rando
 TEST(Renderer, AClosedSurfaceHasNoHoles) {
   RandomStream random(7, "shells");
   for (const int slices : {3, 8, 40, 400}) {
-    Renderer renderer(shell(slices, std::max(2, slices / 2), 5, random), kCamera, {});
+    const worlds::World world = shell(slices, std::max(2, slices / 2), 5, random);
+    Renderer renderer(world, kCamera, {});
     std::vector<float> inverse_depth;
     for (int i = 0; i < 5; ++i) {
       renderer.render_inverse_depth(
@@ -188,7 +190,8 @@ TEST(Renderer, EdgesThroughPixelCentresBelongToSomebody) {
                        {x, y + step, 1});
     }
   }
-  Renderer renderer(builder.finish(), camera, {});
+  const worlds::World world = builder.finish();
+  Renderer renderer(world, camera, {});
   std::vector<float> inverse_depth;
   renderer.render_inverse_depth({}, inverse_depth);
   EXPECT_EQ(std::count(inverse_depth.begin(), inverse_depth.end(), 1.0F), 64 * 48);
@@ -252,7 +255,8 @@ TEST(Renderer, GivesTheSameBitsAgainAndOnAnyThread) {
 }
 
 TEST(Renderer, SeesNothingInAnEmptyWorld) {
-  Renderer renderer(worlds::World{}, kCamera, {});
+  const worlds::World nothing;
+  Renderer renderer(nothing, kCamera, {});
   std::vector<float> inverse_depth;
   renderer.render_inverse_depth({}, inverse_depth);
   ASSERT_EQ(inverse_depth.size(), index_of(0, kCamera.height));

@@ -48,57 +48,79 @@ Backdrop::Backdrop(const InfraredLightConfig& light, const worlds::World& world)
   sky_lx_ = static_cast<float>(light.sky_darkness * light.sky_lx);
 }
 
-float Backdrop::sky(const Vec3f& direction, float pixel_rad) const {
+Float8 Backdrop::sky(const Rays& direction, const Float8& norm, float pixel_rad) const {
   // Clouds on a plane overhead; near the horizon they are too far to be told apart.
-  const float slope = std::max(direction.z() / direction.norm(), 0.02F);
-  const Eigen::Vector2f p = direction.head<2>() / (direction.norm() * slope);
-  const float cloud = texture_at(clouds_, kSkyKey, p.x(), p.y(), pixel_rad / (slope * slope));
-  const float haze = 1.3F - 0.6F * slope;  // brighter towards the horizon
+  const Float8 rise = direction[2] / norm, least = Float8{} + 0.02F;
+  const Float8 slope = rise < least ? least : rise;
+  const Float8 along = norm * slope;
+  const Float8 cloud = texture_at(clouds_, kSkyKey, direction[0] / along, direction[1] / along,
+                                  pixel_rad / (slope * slope));
+  const Float8 haze = 1.3F - 0.6F * slope;  // brighter towards the horizon
   return sky_lx_ * cloud * haze;
 }
 
-float Backdrop::ground(const Vec3f& from, const Vec3f& direction, float pixel_rad) const {
-  const float down = std::max(-direction.z(), 1e-4F);
-  const float t = std::max(from.z(), 0.0F) / down;
-  const Vec3f p = from + t * direction;
-  const float footprint = pixel_rad * t * direction.squaredNorm() / down;
-  return ground_lx_ * texture_at(ground_, kGroundKey, p.x(), p.y(), footprint);
+Float8 Backdrop::ground(const Vec3f& from, const Rays& direction, const Float8& squared,
+                        float pixel_rad) const {
+  const Float8 least = Float8{} + 1e-4F;
+  const Float8 down = -direction[2] < least ? least : -direction[2];
+  const Float8 t = std::max(from.z(), 0.0F) / down;
+  const Float8 footprint = pixel_rad * t * squared / down;
+  return ground_lx_ * texture_at(ground_, kGroundKey, from.x() + t * direction[0],
+                                 from.y() + t * direction[1], footprint);
+}
+
+Float8 Backdrop::at(const Vec3f& eye, const Rays& direction, float pixel_rad) const {
+  const Float8 zero{}, one = zero + 1.0F;
+  const auto share = [&](const Float8& x) { return x < zero ? zero : one < x ? one : x; };
+  const Float8 squared =
+      direction[0] * direction[0] + (direction[1] * direction[1] + direction[2] * direction[2]);
+  const Float8 norm = root(squared);
+  // How far along the ray its wall stands.
+  const Vec3f from = eye - middle_;
+  Float8 wall = zero + std::numeric_limits<float>::infinity();
+  Int8 across{};  // -1: it stands across y, not x
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const Float8 side = direction[i] > zero ? zero + half_[k] : zero - half_[k];
+    const Float8 t = (side - from[k]) / direction[i];
+    const Int8 nearer = (direction[i] != zero) & (t > zero) & (t < wall);
+    wall = nearer ? t : wall;
+    across = i == 1 ? across | nearer : across;
+  }
+  const Int8 walled = wall < std::numeric_limits<float>::infinity();
+  const Float8 reach = walled ? wall : one;
+  // Where one ends and another begins, a pixel has its share of both.
+  const Float8 footprint = pixel_rad * reach * norm;
+  const Float8 height = from.z() + reach * direction[2];
+  const Float8 above_ground = walled ? share(height / footprint + 0.5F) : one;
+  Float8 light = zero;
+  if (any(above_ground < one)) {
+    light += (one - above_ground) * ground(from, direction, squared, pixel_rad);
+  }
+  if (!any(above_ground > zero)) return light;
+  const Float8 along = across ? from.x() + reach * direction[0] : from.y() + reach * direction[1];
+  const Int8 axis = across ? Int8{} + 1 : Int8{};
+  const Int8 ahead = (across ? direction[1] : direction[0]) > zero;  // -1: it is
+  const Uint8 key = kTreesKey + (Uint8)(2 * axis - ahead);
+  Float8 below_sky = zero;
+  if (any(walled)) {
+    const Float8 crown = texture_at(trees_, key ^ 0x55U, along, zero, footprint) - 1.0F;
+    const Float8 top = kTreeHeight + kCrown * crown;
+    below_sky = walled ? share((top - height) / footprint + 0.5F) : zero;
+  }
+  if (any(below_sky < one)) {
+    light += above_ground * (one - below_sky) * sky(direction, norm, pixel_rad);
+  }
+  if (!any(below_sky > zero)) return light;
+  // Dark between the stems, bright in the crowns.
+  const Float8 trees = texture_at(trees_, key, along, height, footprint);
+  return light + above_ground * below_sky * wall_lx_ *
+                     (0.35F + 0.65F * share(height / kTreeHeight)) * trees;
 }
 
 float Backdrop::at(const Vec3f& eye, const Vec3f& direction, float pixel_rad) const {
-  // How far along the ray its wall stands.
-  const Vec3f from = eye - middle_;
-  float wall = std::numeric_limits<float>::infinity();
-  int axis = 0;
-  for (int i = 0; i < 2; ++i) {
-    if (direction[i] == 0) continue;
-    const float side = direction[i] > 0 ? half_[i] : -half_[i];
-    const float t = (side - from[i]) / direction[i];
-    if (t > 0 && t < wall) {
-      wall = t;
-      axis = i;
-    }
-  }
-  if (!(wall < std::numeric_limits<float>::infinity())) return sky(direction, pixel_rad);
-  // Where one ends and another begins, a pixel has its share of both.
-  const float footprint = pixel_rad * wall * direction.norm();
-  const Vec3f p = from + wall * direction;
-  const float above_ground = std::clamp(p.z() / footprint + 0.5F, 0.0F, 1.0F);
-  float light = 0;
-  if (above_ground < 1) light += (1 - above_ground) * ground(from, direction, pixel_rad);
-  if (above_ground == 0) return light;
-  const std::uint32_t key = kTreesKey + static_cast<std::uint32_t>(2 * axis) +
-                            static_cast<std::uint32_t>(direction[axis] > 0);
-  const float along = p[1 - axis];
-  const float crown = texture_at(trees_, key ^ 0x55U, along, 0, footprint) - 1;
-  const float top = kTreeHeight + kCrown * crown;
-  const float below_sky = std::clamp((top - p.z()) / footprint + 0.5F, 0.0F, 1.0F);
-  if (below_sky < 1) light += above_ground * (1 - below_sky) * sky(direction, pixel_rad);
-  if (below_sky == 0) return light;
-  // Dark between the stems, bright in the crowns.
-  const float height = std::clamp(p.z() / kTreeHeight, 0.0F, 1.0F);
-  const float trees = texture_at(trees_, key, along, p.z(), footprint);
-  return light + above_ground * below_sky * wall_lx_ * (0.35F + 0.65F * height) * trees;
+  const Float8 zero{};
+  return at(eye, {zero + direction.x(), zero + direction.y(), zero + direction.z()}, pixel_rad)[0];
 }
 
 }  // namespace arex::sim

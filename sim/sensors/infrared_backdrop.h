@@ -1,7 +1,8 @@
 #pragma once
 
-#include <cstdint>
+#include <array>
 
+#include "sensors/eight.h"
 #include "sensors/infrared_config.h"
 #include "sensors/infrared_materials.h"
 #include "worlds/world.h"
@@ -18,11 +19,16 @@ class Backdrop {
   /// @param direction in W, not zero
   /// @param pixel_rad what a pixel covers
   [[nodiscard]] float at(const Vec3f& eye, const Vec3f& direction, float pixel_rad) const;
+  /// The same along eight rays, by their coordinates.
+  using Rays = std::array<Float8, 3>;
+  [[nodiscard]] Float8 at(const Vec3f& eye, const Rays& direction, float pixel_rad) const;
 
  private:
   /// @param from the eye, from `middle_`
-  [[nodiscard]] float ground(const Vec3f& from, const Vec3f& direction, float pixel_rad) const;
-  [[nodiscard]] float sky(const Vec3f& direction, float pixel_rad) const;
+  /// @param squared of the rays' lengths
+  [[nodiscard]] Float8 ground(const Vec3f& from, const Rays& direction, const Float8& squared,
+                              float pixel_rad) const;
+  [[nodiscard]] Float8 sky(const Rays& direction, const Float8& norm, float pixel_rad) const;
 
   Vec3f middle_;          ///< of the wall of trees, at the ground's height
   Eigen::Vector2f half_;  ///< of its sides, m

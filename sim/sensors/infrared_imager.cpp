@@ -1,7 +1,9 @@
 #include "sensors/infrared_imager.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 
 #include "math/mix.h"
 
@@ -111,6 +113,43 @@ float InfraredImager::mean_along(const std::vector<float>& in, int u, int v, flo
   return sum * step;
 }
 
+/// The same of eight pixels from (u, v) on, each along its own way.
+Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int v) const {
+  Float8 du, dv;
+  std::memcpy(&du, &way_u_[size(u)], sizeof du);
+  std::memcpy(&dv, &way_v_[size(u)], sizeof dv);
+  const Float8 zero{}, across = du < 0 ? -du : du, along = dv < 0 ? -dv : dv;
+  const Float8 length = across < along ? along : across;
+  const Int8 wanted = __builtin_convertvector(length, Int8) + 2;
+  const Int8 taps = wanted < kMostTaps ? wanted : kMostTaps - Int8{};
+  int most = 0;
+  for (int i = 0; i < 8; ++i) most = std::max(most, taps[i]);
+  const Float8 step = 1 / __builtin_convertvector(taps, Float8);
+  const Float8 last_u = zero + (static_cast<float>(camera_.width) - 1.001F);
+  const Float8 last_v = zero + (static_cast<float>(camera_.height) - 1.001F);
+  const auto within = [&zero](const Float8& x, const Float8& last) {
+    const Float8 low = x < zero ? zero : x;
+    return last < low ? last : low;
+  };
+  const Float8 from_u = static_cast<float>(u) + Float8{0, 1, 2, 3, 4, 5, 6, 7};
+  const Float8 from_v = zero + static_cast<float>(v);
+  const float* next_row = in.data() + camera_.width;
+  Float8 s = 0.5F * step - 0.5F, sum{};
+  for (int k = 0; k < most; ++k, s += step) {
+    const Float8 cu = within(from_u + s * du, last_u), cv = within(from_v + s * dv, last_v);
+    const Int8 column = __builtin_convertvector(cu, Int8), row = __builtin_convertvector(cv, Int8);
+    const Float8 a = cu - __builtin_convertvector(column, Float8);
+    const Float8 b = cv - __builtin_convertvector(row, Float8);
+    const Int8 at = row * camera_.width + column;
+    const Float8 left = gather(in.data(), at), right = gather(in.data() + 1, at);
+    const Float8 below_left = gather(next_row, at), below_right = gather(next_row + 1, at);
+    const Float8 upper = left + a * (right - left);
+    const Float8 lower = below_left + a * (below_right - below_left);
+    sum += k < taps ? upper + b * (lower - upper) : zero;
+  }
+  return sum * step;
+}
+
 /// Each pixel takes the mean of the light along the way that its own surface's image goes.
 void InfraredImager::smear(const InfraredScene& scene, double exposure_s,
                            const CameraTwist& twist) {
@@ -119,10 +158,24 @@ void InfraredImager::smear(const InfraredScene& scene, double exposure_s,
   for (int v = 0; v < camera_.height; ++v) {
     find_ways(scene, v, exposure_s, twist);
     float* out = &smeared_[size(v) * size(w)];
-    for (int u = 0; u < w; ++u) {
-      const float du = way_u_[size(u)], dv = way_v_[size(u)];
-      if (std::max(std::abs(du), std::abs(dv)) < kLeastSmear) continue;
-      out[u] = mean_along(scene.light_lx, u, v, du, dv);
+    const auto moves = [&](int u) {
+      return !(std::max(std::abs(way_u_[size(u)]), std::abs(way_v_[size(u)])) < kLeastSmear);
+    };
+    for (int u = 0; u < w;) {
+      if (u + 8 <= w) {
+        std::array<bool, 8> moved{};
+        for (int i = 0; i < 8; ++i) moved[size(i)] = moves(u + i);
+        if (std::find(moved.begin(), moved.end(), true) != moved.end()) {
+          const Float8 mean = mean_along_eight(scene.light_lx, u, v);
+          for (int i = 0; i < 8; ++i) out[u + i] = moved[size(i)] ? mean[i] : out[u + i];
+        }
+        u += 8;
+        continue;
+      }
+      if (moves(u)) {
+        out[u] = mean_along(scene.light_lx, u, v, way_u_[size(u)], way_v_[size(u)]);
+      }
+      ++u;
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "messages/sensors.h"
+#include "sensors/eight.h"
 #include "sensors/infrared_config.h"
 #include "sensors/infrared_shot.h"
 
@@ -36,6 +37,7 @@ class InfraredImager {
   void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist);
   [[nodiscard]] float mean_along(const std::vector<float>& in, int u, int v, float du,
                                  float dv) const;
+  [[nodiscard]] Float8 mean_along_eight(const std::vector<float>& in, int u, int v) const;
   void spread();
   void read(const InfraredExposure& exposure, std::uint64_t seed, std::vector<std::uint8_t>& grey);
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sensors/eight.h"
 #include "sensors/infrared_config.h"
 #include "sensors/infrared_lamps.h"
 #include "sensors/infrared_sun.h"
@@ -13,9 +14,6 @@
 #include "worlds/world.h"
 
 namespace arex::sim {
-
-/// Eight numbers that are added and multiplied each for itself (GCC's vectors).
-using Float8 = float __attribute__((vector_size(32)));
 
 /// The light that does not come straight from the sun: sky, lamps, and what surfaces send on. Held
 /// at the nodes of a grid as the illuminance of six small surfaces that face along the axes,

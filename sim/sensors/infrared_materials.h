@@ -6,14 +6,12 @@
 #include <vector>
 
 #include "math/types.h"
+#include "sensors/eight.h"
 #include "sensors/infrared_lamps.h"
 #include "sensors/infrared_light.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
-
-using Int8 = std::int32_t __attribute__((vector_size(32)));
-using Uint8 = std::uint32_t __attribute__((vector_size(32)));
 
 /// How surfaces of one class look: a texture of four octaves of noise, coarse to fine.
 struct Material {
@@ -124,14 +122,45 @@ inline float texture_at(const Material& material, std::uint32_t key, float a, fl
   return std::max(relative, 0.05F);
 }
 
-/// The same at eight places of one surface at once.
-inline Float8 texture_at(const Material& material, std::uint32_t key, const Float8& a,
-                         const Float8& b, const Float8& footprint_m) {
+/// What eight places know of their materials.
+struct OneMaterial {
+  const Material& material;
+  [[nodiscard]] float cell_m(std::size_t k) const { return material.cell_m[k]; }
+  [[nodiscard]] float cells_per_m(std::size_t k) const {
+    return material.cells_per_m[static_cast<int>(k)];
+  }
+  [[nodiscard]] float amplitude(std::size_t k) const { return material.amplitude[k]; }
+  [[nodiscard]] float stretch() const { return material.stretch; }
+};
+struct EightMaterials {
+  const std::array<const Material*, 8>& materials;
+  template <class Member>
+  [[nodiscard]] Float8 each(const Member& member) const {
+    return Float8{member(*materials[0]), member(*materials[1]), member(*materials[2]),
+                  member(*materials[3]), member(*materials[4]), member(*materials[5]),
+                  member(*materials[6]), member(*materials[7])};
+  }
+  [[nodiscard]] Float8 cell_m(std::size_t k) const {
+    return each([k](const Material& m) { return m.cell_m[k]; });
+  }
+  [[nodiscard]] Float8 cells_per_m(std::size_t k) const {
+    return each([k](const Material& m) { return m.cells_per_m[static_cast<int>(k)]; });
+  }
+  [[nodiscard]] Float8 amplitude(std::size_t k) const {
+    return each([k](const Material& m) { return m.amplitude[k]; });
+  }
+  [[nodiscard]] Float8 stretch() const {
+    return each([](const Material& m) { return m.stretch; });
+  }
+};
+
+/// texture_at() at eight places at once. @param key one, or one each
+template <class Materials, class Key>
+Float8 texture_at_eight(const Materials& materials, const Key& key, const Float8& a,
+                        const Float8& b, const Float8& footprint_m) {
   constexpr float kFull = 3, kNone = 1.5;
   constexpr std::array<std::uint32_t, Material::kOctaves> kOctave{0x9E3779B9U, 0x3C6EF372U,
                                                                   0xDAA66D2BU, 0x78DDE6E4U};
-  float least = footprint_m[0];
-  for (int i = 1; i < 8; ++i) least = std::min(least, footprint_m[i]);
   const auto floor = [](const Float8& v) {
     const Int8 i = __builtin_convertvector(v, Int8);
     return i + (__builtin_convertvector(i, Float8) > v);
@@ -143,12 +172,12 @@ inline Float8 texture_at(const Material& material, std::uint32_t key, const Floa
   const Float8 zero{}, one = zero + 1.0F;
   Float8 relative = one;
   for (std::size_t k = 0; k < Material::kOctaves; ++k) {
-    const float cell = material.cell_m[k];
-    if (2 * cell < kNone * least) break;  // the finer ones do not show, either
+    const auto cell = materials.cell_m(k);
+    if (!any(2 * cell >= kNone * footprint_m)) break;  // the finer ones do not show, either
     Float8 fade = (2 * cell / footprint_m - kNone) * (1 / (kFull - kNone));
     fade = fade < zero ? zero : fade > one ? one : fade;
-    const float per_m = material.cells_per_m[static_cast<int>(k)];
-    const Float8 x = a * per_m, y = b * material.stretch * per_m;
+    const auto per_m = materials.cells_per_m(k);
+    const Float8 x = a * per_m, y = b * materials.stretch() * per_m;
     const Int8 i = floor(x), j = floor(y);
     const Float8 s = smooth(x - __builtin_convertvector(i, Float8));
     const Float8 t = smooth(y - __builtin_convertvector(j, Float8));
@@ -160,10 +189,22 @@ inline Float8 texture_at(const Material& material, std::uint32_t key, const Floa
       return left + s * (grey(lattice_hash(column + 0x27D4EB2FU + line)) - left);
     };
     const Float8 low = along(row);
-    relative += material.amplitude[k] * fade * (low + t * (along(above) - low));
+    relative += materials.amplitude(k) * fade * (low + t * (along(above) - low));
   }
   const Float8 floor_of_it = zero + 0.05F;
   return relative < floor_of_it ? floor_of_it : relative;
+}
+
+/// The same at eight places of one surface, or of several of one material.
+template <class Key>
+Float8 texture_at(const Material& material, const Key& key, const Float8& a, const Float8& b,
+                  const Float8& footprint_m) {
+  return texture_at_eight(OneMaterial{material}, key, a, b, footprint_m);
+}
+/// And at eight places of as many surfaces.
+inline Float8 texture_at(const std::array<const Material*, 8>& materials, const Uint8& key,
+                         const Float8& a, const Float8& b, const Float8& footprint_m) {
+  return texture_at_eight(EightMaterials{materials}, key, a, b, footprint_m);
 }
 
 }  // namespace arex::sim

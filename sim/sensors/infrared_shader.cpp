@@ -9,38 +9,12 @@ namespace arex::sim {
 namespace {
 
 constexpr double kStripArea = 1.5 * 0.2;  // of a lamp, m^2
-constexpr float kSeamWidth = 0.012F;      // m
-constexpr float kSeamDark = 0.35F;        // share of the light lost in it
-constexpr float kLeastSlant = 0.15F;      // cosine: surfaces seen more obliquely count as this
 
 PinholeCamera finer(const PinholeCamera& camera, int samples) {
   // Pixel centres are at integers: sample k of a pixel lies (k + 0.5) / samples - 0.5 beside it.
   const double shift = 0.5 * (samples - 1);
   return {samples * camera.width, samples * camera.height,     samples * camera.fx,
           samples * camera.fy,    samples * camera.cx + shift, samples * camera.cy + shift};
-}
-
-/// Share of the sun that reaches a surface of unit normal n, on either side: asked for off the
-/// surface, by more than its slope makes of a texel of the map.
-float sun_on(const SunMap& sun, const Vec3f& p, const Vec3f& n) {
-  constexpr double kTexels = 2;
-  const auto off = static_cast<float>(kTexels * sun.texel_m());
-  return sun.visible(p + (n.dot(sun.direction_W()) > 0 ? off : -off) * n);
-}
-
-Float8 root(const Float8& v) {
-  Float8 out;
-  for (int i = 0; i < 8; ++i) out[i] = std::sqrt(v[i]);
-  return out;
-}
-
-/// How dark a joint between panels makes a pixel that covers `footprint` at a distance from it.
-float seam(float at, float spacing, float footprint) {
-  const float cells = at / spacing;
-  const auto nearest = static_cast<float>(static_cast<int>(cells + (cells > 0 ? 0.5F : -0.5F)));
-  const float distance = std::abs(at - nearest * spacing);
-  const float width = std::max(kSeamWidth, footprint);
-  return distance < 0.5F * width ? 1 - kSeamDark * kSeamWidth / width : 1;
 }
 
 std::vector<Lamp> lit(const InfraredLightConfig& light, const std::vector<Lamp>& lamps) {
@@ -66,48 +40,17 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
   for (int u = 0; u < camera.width; ++u) {
     column_x_.push_back(static_cast<float>((u - camera.cx) / camera.fx));
   }
-}
-
-float InfraredShader::textured(const SurfaceFacet& facet, const Material& material, const Vec3f& p,
-                               const Vec3f& ray_W, float z, float towards) const {
-  const float slant = std::max(std::abs(towards) / ray_W.norm(), kLeastSlant);
-  const float footprint = z * pixel_rad_ / slant;
-  const float a = p[facet.first_axis], b = p[facet.second_axis];
-  float relative = texture_at(material, facet.key, a, b, footprint);
-  if (material.seam_m > 0) {
-    relative *= seam(a, material.seam_m, footprint) * seam(b, material.seam_m, footprint);
-  }
-  return relative;
-}
-
-float InfraredShader::surface(const View& view, std::uint32_t triangle, const Vec3f& ray_W,
-                              float inverse_depth) const {
-  const SurfaceFacet& facet = surfaces_.facet(triangle);
-  if (facet.glows) return lamp_lx_;
-  const Material& material = surfaces_.material(facet);
-  const float z = 1 / inverse_depth;
-  const float towards = facet.normal_W.dot(ray_W);
-  const bool from_behind = towards > 0;
-  if (facet.small) {
-    const float light = from_behind ? facet.back : facet.front;
-    if (!texture_shows(material, z * pixel_rad_)) return light;
-    return light * textured(facet, material, view.eye_W + z * ray_W, ray_W, z, towards);
-  }
-  const Vec3f p = view.eye_W + z * ray_W;
-  const Side side = side_of(facet, material, from_behind);
-  float lux = indirect(side, material, p);
-  if (side.sun_lx > 0) lux += side.sun_lx * sun_on(sun_, p, side.normal_W);
-  return facet.albedo * lux * textured(facet, material, p, ray_W, z, towards);
+  mixtures_.resize(column_x_.size());
+  scattered_lx_.resize(4 * column_x_.size());
 }
 
 InfraredShader::Side InfraredShader::side_of(const SurfaceFacet& facet, const Material& material,
                                              bool from_behind) const {
   const Float8 flipped = __builtin_shuffle(facet.weights, Int8{1, 0, 3, 2, 5, 4, 7, 6});
-  Side side{from_behind ? Vec3f(-facet.normal_W) : facet.normal_W,
-            from_behind ? flipped : facet.weights, from_behind ? facet.weights : flipped};
-  const float facing = side.normal_W.dot(sun_.direction_W());
-  side.sun_lx = sun_lx_ * (facing > 0 ? facing : -facing * material.translucency);
-  return side;
+  const Vec3f normal = from_behind ? Vec3f(-facet.normal_W) : facet.normal_W;
+  const float facing = normal.dot(sun_.direction_W());
+  return {normal, from_behind ? flipped : facet.weights, from_behind ? facet.weights : flipped,
+          sun_lx_ * (facing > 0 ? facing : -facing * material.translucency)};
 }
 
 float InfraredShader::indirect(const Side& side, const Material& material, const Vec3f& p) const {
@@ -159,28 +102,28 @@ void InfraredShader::eight_pixels(const View& view, const Vec3f& row_W, int u,
     const Side side = side_of(facet, material, from_behind);
     const float begin = indirect(side, material, at(0)), end = indirect(side, material, at(7));
     lux = begin + (end - begin) * (1.0F / 7) * Float8{0, 1, 2, 3, 4, 5, 6, 7};
-    for (int i = 0; i < 8 && side.sun_lx > 0; ++i) {
-      lux[i] += side.sun_lx * sun_on(sun_, at(i), side.normal_W);
+    if (side.sun_lx > 0) {
+      const Vec3f off = off_towards_sun(side.normal_W);
+      lux += side.sun_lx * sun_.visible({p[0] + off.x(), p[1] + off.y(), p[2] + off.z()});
     }
     lux *= facet.albedo;
   }
   if (!facet.glows) {
-    const Float8 cosine = (towards < 0 ? -towards : towards) / root(squared);
-    const Float8 slant = cosine < kLeastSlant ? kLeastSlant - Float8{} : cosine;
-    const Float8 footprint = z * pixel_rad_ / slant;
+    const Float8 footprint = footprint_of(z, towards, squared);
     const Float8 &a = p[facet.first_axis], &b = p[facet.second_axis];
     lux *= texture_at(material, facet.key, a, b, footprint);
-    for (int i = 0; i < 8 && material.seam_m > 0; ++i) {
-      lux[i] *=
-          seam(a[i], material.seam_m, footprint[i]) * seam(b[i], material.seam_m, footprint[i]);
+    if (material.seam_m > 0) {
+      const Float8 spacing = material.seam_m - Float8{};
+      lux *= seam(a, spacing, footprint) * seam(b, spacing, footprint);
     }
   }
   std::memcpy(light, &lux, sizeof lux);
 }
 
+/// Notes what a pixel shows: each of its triangles once, in the middle of its samples.
 /// @param row_W the ray through the row's pixel of column cx
-float InfraredShader::pixel(const View& view, const Vec3f& row_W, int u, int v,
-                            float& inverse_depth) const {
+void InfraredShader::split_pixel(const View& view, const Vec3f& row_W, int u, int v,
+                                 float& inverse_depth) {
   const auto row = static_cast<std::size_t>(fine_.width);
   const std::size_t first =
       static_cast<std::size_t>(kSamples * v) * row + static_cast<std::size_t>(kSamples * u);
@@ -193,17 +136,24 @@ float InfraredShader::pixel(const View& view, const Vec3f& row_W, int u, int v,
   }
   inverse_depth = 0.25F * ((q[0] + q[1]) + (q[2] + q[3]));
   const Vec3f ray_W = row_W + column_x_[static_cast<std::size_t>(u)] * view.right_W;
-  const auto light = [&](std::uint32_t triangle, const Vec3f& ray, float depth) {
-    return triangle == Renderer::kNoTriangle ? backdrop_.at(view.eye_W, ray, pixel_rad_)
-                                             : surface(view, triangle, ray, depth);
+  Mixture& mixture = mixtures_[static_cast<std::size_t>(u)];
+  mixture.surfaces = 0;
+  const auto show = [&](std::uint32_t triangle, const Vec3f& ray, float depth, float count) {
+    const auto slot = static_cast<std::uint32_t>(4 * u + mixture.surfaces);
+    mixture.samples[static_cast<std::size_t>(mixture.surfaces++)] = count;
+    if (triangle == Renderer::kNoTriangle) {
+      backdrop_queue_.add(slot, triangle, ray, depth);
+    } else {
+      __builtin_prefetch(&surfaces_.facet(triangle));  // nobody can guess which comes next
+      surface_queue_.add(slot, triangle, ray, depth);
+    }
   };
   if (seen[0] == seen[1] && seen[0] == seen[2] && seen[0] == seen[3]) {
-    return light(seen[0], ray_W, inverse_depth);
+    show(seen[0], ray_W, inverse_depth, 4);
+    return;
   }
-  // Each of the triangles once, in the middle of its samples.
   constexpr std::array<float, 4> kBeside{-0.25F, 0.25F, -0.25F, 0.25F};
   constexpr std::array<float, 4> kBelow{-0.25F, -0.25F, 0.25F, 0.25F};
-  float total = 0;
   std::array<bool, 4> done{};
   for (std::size_t i = 0; i < 4; ++i) {
     if (done[i]) continue;
@@ -218,7 +168,17 @@ float InfraredShader::pixel(const View& view, const Vec3f& row_W, int u, int v,
     }
     const float share = 1 / count, pixel = share * pixel_rad_;
     const Vec3f ray = ray_W + pixel * beside * view.right_W + pixel * below * view.down_W;
-    total += count * light(seen[i], ray, share * depth);
+    show(seen[i], ray, share * depth, count);
+  }
+}
+
+float InfraredShader::mixed(int u) const {
+  const Mixture& mixture = mixtures_[static_cast<std::size_t>(u)];
+  const float* light = &scattered_lx_[4 * static_cast<std::size_t>(u)];
+  if (mixture.surfaces == 1) return light[0];
+  float total = 0;
+  for (int i = 0; i < mixture.surfaces; ++i) {
+    total += mixture.samples[static_cast<std::size_t>(i)] * light[i];
   }
   return 0.25F * total;
 }
@@ -241,11 +201,15 @@ void InfraredShader::draw(const Pose& X_WC, InfraredScene& out) {
       const std::size_t first = kSamples * (kSamples * row + static_cast<std::size_t>(u));
       if (u + 8 <= camera_.width && is_even(first)) {
         eight_pixels(view, row_W, u, first, light + u, inverse_depth + u);
-        u += 8;
+        for (int i = 0; i < 8; ++i) mixtures_[static_cast<std::size_t>(u++)].surfaces = 0;
         continue;
       }
       const int end = std::min(u + 8, camera_.width);
-      for (; u < end; ++u) light[u] = pixel(view, row_W, u, v, inverse_depth[u]);
+      for (; u < end; ++u) split_pixel(view, row_W, u, v, inverse_depth[u]);
+    }
+    shade_queues(view);
+    for (int u = 0; u < camera_.width; ++u) {
+      if (mixtures_[static_cast<std::size_t>(u)].surfaces > 0) light[u] = mixed(u);
     }
   }
 }

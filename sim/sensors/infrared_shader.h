@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -50,16 +51,27 @@ class InfraredShader {
     Vec3f eye_W;
     Vec3f right_W, down_W;  ///< the image's axes, unit
   };
-  /// Light that comes from a triangle along a ray, of depth 1 in C, as a white surface's, lx.
-  [[nodiscard]] float surface(const View& view, std::uint32_t triangle, const Vec3f& ray_W,
-                              float inverse_depth) const;
-  [[nodiscard]] float textured(const SurfaceFacet& facet, const Material& material, const Vec3f& p,
-                               const Vec3f& ray_W, float z, float towards) const;
+  /// Surfaces that pixels of a row show and whose light is still to be found.
+  struct Queue {
+    std::vector<std::uint32_t> slot;  ///< where their light goes
+    std::vector<std::uint32_t> triangle;
+    std::array<std::vector<float>, 3> ray_W;  ///< of depth 1 in C
+    std::vector<float> inverse_depth;
+
+    void add(std::uint32_t to, std::uint32_t of, const Vec3f& ray, float depth);
+    void fill_up();  ///< repeats the last until their number is one of eights
+    void clear();
+  };
+  /// What a pixel shows, and in how many of its samples; its light stands in four slots.
+  struct Mixture {
+    int surfaces = 0;
+    std::array<float, 4> samples{};
+  };
   /// Where a facet shows the eye which side, under what light from sky, lamps and surfaces.
   struct Side {
     Vec3f normal_W;
     Float8 near, far;  ///< weights of the side seen, and of the other
-    float sun_lx = 0;  ///< where the sun reaches it
+    float sun_lx;      ///< where the sun reaches it
   };
   [[nodiscard]] Side side_of(const SurfaceFacet& facet, const Material& material,
                              bool from_behind) const;
@@ -68,8 +80,17 @@ class InfraredShader {
   [[nodiscard]] bool is_even(std::size_t first_sample) const;
   void eight_pixels(const View& view, const Vec3f& row_W, int u, std::size_t first_sample,
                     float* light, float* inverse_depth) const;
-  [[nodiscard]] float pixel(const View& view, const Vec3f& row_W, int u, int v,
-                            float& inverse_depth) const;
+  void split_pixel(const View& view, const Vec3f& row_W, int u, int v, float& inverse_depth);
+  [[nodiscard]] Float8 eight_surfaces(const View& view, std::size_t first) const;
+  void shade_queues(const View& view);
+  [[nodiscard]] float mixed(int u) const;
+  /// What pixels cover of surfaces at depth z, m. @param squared of their rays' lengths
+  [[nodiscard]] Float8 footprint_of(const Float8& z, const Float8& towards,
+                                    const Float8& squared) const;
+  static Float8 seam(const Float8& at, const Float8& spacing, const Float8& footprint);
+  /// What a point of a surface of unit normal n, of either side, is asked for the sun off it: more
+  /// than its slope makes of a texel of the map.
+  [[nodiscard]] Vec3f off_towards_sun(const Vec3f& n) const;
 
   PinholeCamera camera_, fine_;
   std::vector<Lamp> lamps_;
@@ -83,6 +104,9 @@ class InfraredShader {
   std::vector<float> column_x_;  ///< (u - cx) / fx
   std::vector<float> fine_inverse_depth_;
   std::vector<std::uint32_t> triangles_;
+  Queue surface_queue_, backdrop_queue_;
+  std::vector<Mixture> mixtures_;    ///< of a row's pixels
+  std::vector<float> scattered_lx_;  ///< four slots for each
 };
 
 }  // namespace arex::sim

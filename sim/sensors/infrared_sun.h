@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "math/pose.h"
+#include "sensors/eight.h"
 #include "sensors/infrared_config.h"
 #include "worlds/world.h"
 
@@ -30,6 +32,28 @@ class SunMap {
     const float upper = lit(at[0]) + du * (lit(at[1]) - lit(at[0]));
     const float lower = lit(below[0]) + du * (lit(below[1]) - lit(below[0]));
     return upper + dv * (lower - upper);
+  }
+  /// The same of eight points, by their coordinates.
+  [[nodiscard]] Float8 visible(const std::array<Float8, 3>& p_W) const {
+    const std::array<Float8, 3> d{p_W[0] - eye_.x(), p_W[1] - eye_.y(), p_W[2] - eye_.z()};
+    const auto along = [&](int i) {
+      return axes_(i, 0) * d[0] + (axes_(i, 1) * d[1] + axes_(i, 2) * d[2]) + lift_[i];
+    };
+    const Float8 q = 1 / along(2);
+    const Float8 u = fx_ * along(0) * q + cx_, v = fx_ * along(1) * q + cy_;
+    const Float8 zero{}, one = zero + 1.0F;
+    const Int8 inside = (u >= zero) & (v >= zero) & (u < last_u_) & (v < last_v_);
+    const Int8 column = __builtin_convertvector(inside ? u : zero, Int8);
+    const Int8 row = __builtin_convertvector(inside ? v : zero, Int8);
+    const Float8 du = u - __builtin_convertvector(column, Float8);
+    const Float8 dv = v - __builtin_convertvector(row, Float8);
+    const Int8 at = row * width_ + column;
+    const auto lit = [&](const float* from) { return gather(from, at) > q ? zero : one; };
+    const float *above = inverse_depth_.data(), *below = above + width_;
+    const Float8 above_left = lit(above), below_left = lit(below);
+    const Float8 upper = above_left + du * (lit(above + 1) - above_left);
+    const Float8 lower = below_left + du * (lit(below + 1) - below_left);
+    return inside ? upper + dv * (lower - upper) : one;
   }
   /// Towards the sun, in W, unit.
   [[nodiscard]] const Vec3f& direction_W() const { return direction_; }

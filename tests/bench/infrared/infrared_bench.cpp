@@ -7,10 +7,12 @@
 #include <ctime>
 #include <fstream>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "files/png.h"
+#include "math/fingerprint.h"
 #include "math/random.h"
 #include "messages/vehicle.h"
 #include "sensors/infrared_exposure.h"
@@ -72,6 +74,7 @@ void measure(const std::string& name, const worlds::World& world, double z_from,
   sim::AutoExposure exposure(config.sensor);
   RandomStream random(2, "poses");
   std::vector<double> draw_ms, left_ms, pair_ms, drawn;
+  Fingerprint hash;
   std::vector<float> inverse_depth;
   std::vector<std::uint32_t> triangles;
   for (int i = 0; i < frames; ++i) {
@@ -94,6 +97,8 @@ void measure(const std::string& name, const worlds::World& world, double z_from,
     shot.right = true;
     const auto both = pair.capture(shot);
     pair_ms.push_back(cpu_ms() - c);
+    hash.add_bytes(std::span<const std::uint8_t>(both->left));
+    hash.add_bytes(std::span<const std::uint8_t>(both->right));
     draw_ms.push_back(b - a);
     drawn.push_back(1e-3 * static_cast<double>(renderer.last_frame().triangles));
     left_ms.push_back(c - b);
@@ -108,6 +113,7 @@ void measure(const std::string& name, const worlds::World& world, double z_from,
   row("left image", left_ms);
   row("pair", pair_ms);
   row("thousands of triangles drawn", drawn);
+  std::printf("  hash of the pairs: %016llx\n", static_cast<unsigned long long>(hash.value()));
 }
 
 }  // namespace

@@ -9,14 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "bag/mcap_file.h"
-#include "bag/ros_bag.h"
-
 namespace arex::sim {
 namespace {
 
-constexpr const char* kOdomFrame = "odom";
-constexpr const char* kBodyFrame = "base_link";
 constexpr const char* kScans = "/livox/lidar";
 constexpr const char* kFrameEnds = "/livox/frame_end";
 constexpr const char* kDepths = "/camera/depth";
@@ -79,25 +74,20 @@ std::array<double, size> covariance(double first = 0) {
   return {first};
 }
 
-std::unique_ptr<MessageFile> file_for(const std::filesystem::path& path,
-                                      BagCompression compression) {
-  if (path.extension() == ".mcap") return std::make_unique<McapFile>(path, compression);
-  return std::make_unique<RosBag>(path, compression);
-}
-
 }  // namespace
 
 BagWriter::BagWriter(const std::filesystem::path& path, const VehicleConfig& vehicle,
                      const BagOptions& options)
-    : file_(file_for(path, options.compression)),
+    : stream_(path, options.compression),
+      message_(stream_.message()),
       options_(options),
-      imu_(topic("/imu/data", imu_type())),
-      livox_imu_(topic("/livox/imu", imu_type())),
-      field_(topic("/imu/mag", magnetic_field_type())),
-      truth_(topic("/truth", odometry_type())),
-      transforms_(topic("/tf", tf_type())),
-      static_transforms_(topic("/tf_static", tf_type(), true)),
-      message_(file_->format()) {
+      imu_(stream_.topic("/imu/data", imu_type())),
+      livox_imu_(stream_.topic("/livox/imu", imu_type())),
+      field_(stream_.topic("/imu/mag", magnetic_field_type())),
+      truth_(stream_.topic("/truth", odometry_type())),
+      transforms_(stream_.topic("/tf", tf_type())),
+      static_transforms_(stream_.topic("/tf_static", tf_type(), true)),
+      display_(stream_) {
   // Those of the first devices come first, in this order.
   topic_of("", kScans, "", scan_type());
   topic_of("", kFrameEnds, "", time_reference_type());
@@ -117,53 +107,33 @@ RosMessageType BagWriter::scan_type() const {
   }
 }
 
-BagWriter::Topic& BagWriter::topic_of(const std::string& device, const char* first,
-                                      const char* further, const RosMessageType& type) {
+MessageStream::Topic& BagWriter::topic_of(const std::string& device, const char* first,
+                                          const char* further, const RosMessageType& type) {
   const std::string name = device.empty() ? first : "/" + device + further;
   const auto known = of_devices_.find(name);
-  return known != of_devices_.end() ? known->second
-                                    : of_devices_.emplace(name, topic(name, type)).first->second;
-}
-
-BagWriter::Topic BagWriter::topic(const std::string& name, const RosMessageType& type,
-                                  bool latched) {
-  return {file_->add_topic(name, type, latched), 0};
-}
-
-void BagWriter::begin_message(Topic& topic, Stamp stamp, const std::string& frame) {
-  message_.clear();
-  put_header(topic, stamp, frame);
-}
-
-void BagWriter::put_header(Topic& topic, Stamp stamp, const std::string& frame) {
-  if (file_->format() == WireFormat::kRos1) message_.put(topic.sequence++);
-  message_.put(ros_time(stamp));
-  message_.put(frame);
-}
-
-void BagWriter::put_numbers(std::span<const double> values) {
-  message_.align(sizeof(double));
-  message_.put_raw(values.data(), values.size_bytes());
+  return known != of_devices_.end()
+             ? known->second
+             : of_devices_.emplace(name, stream_.topic(name, type)).first->second;
 }
 
 void BagWriter::imu_on(Topic& topic, const ImuSample& sample) {
-  begin_message(topic, sample.stamp, kBodyFrame);
+  stream_.begin_message(topic, sample.stamp, kBodyFrame);
   message_.put(Quat::Identity());
-  put_numbers(covariance<9>(-1));  // sensor_msgs/Imu: -1 where there is no estimate
+  stream_.put_numbers(covariance<9>(-1));  // sensor_msgs/Imu: -1 where there is no estimate
   message_.put(sample.gyro_radps);
-  put_numbers(covariance<9>());
+  stream_.put_numbers(covariance<9>());
   message_.put(sample.accel_mps2);
-  put_numbers(covariance<9>());
-  write(topic);
+  stream_.put_numbers(covariance<9>());
+  stream_.write(topic);
 }
 
 void BagWriter::imu(const ImuSample& sample) {
   if (sample.stamp < 0) return;  // its clock lags, and the run has just begun
   // First, so that who reads a sample of the IMU has its field already.
-  begin_message(field_, sample.stamp, kBodyFrame);
+  stream_.begin_message(field_, sample.stamp, kBodyFrame);
   message_.put(kTeslaPerGauss * sample.field_gauss);
-  put_numbers(covariance<9>());
-  write(field_);
+  stream_.put_numbers(covariance<9>());
+  stream_.write(field_);
   imu_on(imu_, sample);
   imu_on(livox_imu_, sample);
 }
@@ -184,10 +154,10 @@ void BagWriter::put_point(const LidarPoint& point, Stamp frame_begin) {
 
 void BagWriter::frame_end(const LidarScan& scan) {
   Topic& topic = topic_of(scan.device, kFrameEnds, "/frame_end", time_reference_type());
-  begin_message(topic, scan.stamp, lidar_frame(scan.device));
+  stream_.begin_message(topic, scan.stamp, lidar_frame(scan.device));
   message_.put(ros_time(scan.end));
   message_.put("frame_end");
-  write(topic);
+  stream_.write(topic);
 }
 
 void BagWriter::scan(const LidarScan& scan) {
@@ -196,7 +166,7 @@ void BagWriter::scan(const LidarScan& scan) {
       options_.lidar_misses ? every_firing(scan) : std::vector<LidarPoint>{};
   const std::vector<LidarPoint>& points = options_.lidar_misses ? every : scan.points;
   Topic& topic = topic_of(scan.device, kScans, "/points", scan_type());
-  begin_message(topic, scan.stamp, lidar_frame(scan.device));
+  stream_.begin_message(topic, scan.stamp, lidar_frame(scan.device));
   const bool is_custom =
       options_.layout == BagLayout::kLivoxCustom || options_.layout == BagLayout::kLivoxCustom2;
   if (is_custom) {
@@ -204,7 +174,7 @@ void BagWriter::scan(const LidarScan& scan) {
   } else {
     cloud(scan, points);
   }
-  write(topic);
+  stream_.write(topic);
 }
 
 void BagWriter::cloud(const LidarScan& scan, const std::vector<LidarPoint>& points) {
@@ -258,33 +228,33 @@ void BagWriter::write_truth() {
   const Pose X_OW = X_WO_.inverse();
   for (const TrueMotion& motion : std::exchange(waiting_, {})) {
     const Pose X_OB = X_OW * motion.X_WB;
-    begin_message(truth_, motion.stamp, kOdomFrame);
+    stream_.begin_message(truth_, motion.stamp, kOdomFrame);
     message_.put(kBodyFrame);
     message_.put(X_OB.p);
     message_.put(X_OB.quaternion());
-    put_numbers(covariance<36>());
+    stream_.put_numbers(covariance<36>());
     message_.put(Vec3(motion.X_WB.R.transpose() * motion.v_WB));
     message_.put(motion.w_WB_B);
-    put_numbers(covariance<36>());
-    file_->write(truth_.connection, ros_time(motion.stamp), message_);
+    stream_.put_numbers(covariance<36>());
+    stream_.write(truth_, motion.stamp);
   }
 }
 
 void BagWriter::close() {
   write_truth();  // of an odometry that never began
-  file_->close();
+  stream_.close();
 }
 
 void BagWriter::estimate(Stamp stamp, const Pose& X_OB) {
   message_.clear();
   message_.put_length(1);
   put_transform(transforms_, stamp, kOdomFrame, kBodyFrame, X_OB);
-  write(transforms_);
+  stream_.write(transforms_);
 }
 
 void BagWriter::put_transform(Topic& topic, Stamp stamp, const std::string& parent,
                               const std::string& child, const Pose& X) {
-  put_header(topic, stamp, parent);
+  stream_.put_header(topic, stamp, parent);
   message_.put(child);
   message_.put(X.p);
   message_.put(X.quaternion());
@@ -300,7 +270,7 @@ void BagWriter::depth(const DepthImage& image) {
   }
   camera_info(image);
   Topic& topic = topic_of(image.device, kDepths, "/depth", image_type());
-  begin_message(topic, image.stamp, camera_frame(image.device));
+  stream_.begin_message(topic, image.stamp, camera_frame(image.device));
   message_.put(height);
   message_.put(width);
   message_.put("32FC1");
@@ -311,14 +281,14 @@ void BagWriter::depth(const DepthImage& image) {
   for (const float z : image.depth_m) {
     message_.put(z > 0 ? z : std::numeric_limits<float>::quiet_NaN());
   }
-  write(topic);
+  stream_.write(topic);
 }
 
 void BagWriter::camera_info(const DepthImage& image) {
   Topic& topic = topic_of(image.device, kCameraInfos, "/camera_info", camera_info_type());
-  begin_message(topic, image.stamp, camera_frame(image.device));
+  stream_.begin_message(topic, image.stamp, camera_frame(image.device));
   put_calibration(image.camera, 0);
-  write(topic);
+  stream_.write(topic);
 }
 
 void BagWriter::put_calibration(const PinholeCamera& c, double baseline_m) {
@@ -326,11 +296,11 @@ void BagWriter::put_calibration(const PinholeCamera& c, double baseline_m) {
   message_.put(static_cast<std::uint32_t>(c.width));
   message_.put("plumb_bob");
   message_.put_length(5);
-  put_numbers(std::array<double, 5>{});
-  put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0});
-  put_numbers(std::array{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0});
+  stream_.put_numbers(std::array<double, 5>{});
+  stream_.put_numbers(std::array{c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0});
+  stream_.put_numbers(std::array{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0});
   const double shift = baseline_m > 0 ? -c.fx * baseline_m : 0.0;
-  put_numbers(std::array{c.fx, 0.0, c.cx, shift, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
+  stream_.put_numbers(std::array{c.fx, 0.0, c.cx, shift, 0.0, c.fy, c.cy, 0.0, 0.0, 0.0, 1.0, 0.0});
   for (int i = 0; i < 2; ++i) message_.put(std::uint32_t{0});  // binning: none
   for (int i = 0; i < 4; ++i) message_.put(std::uint32_t{0});  // region of interest: all
   message_.put(false);
@@ -353,12 +323,12 @@ void BagWriter::eye(const StereoImage& image, int number, const std::vector<std:
   const std::string frame = infrared_frame(number);
   const StereoCamera& camera = image.camera;
   Topic& info = topic_of("", (name + "/camera_info").c_str(), "", camera_info_type());
-  begin_message(info, image.time_ns, frame);
+  stream_.begin_message(info, image.time_ns, frame);
   put_calibration({image.width, image.height, camera.f_px, camera.f_px, camera.cx, camera.cy},
                   number == 2 ? camera.baseline_m : 0);
-  write(info);
+  stream_.write(info);
   Topic& topic = topic_of("", (name + "/image_rect_raw").c_str(), "", image_type());
-  begin_message(topic, image.time_ns, frame);
+  stream_.begin_message(topic, image.time_ns, frame);
   message_.put(static_cast<std::uint32_t>(image.height));
   message_.put(static_cast<std::uint32_t>(image.width));
   message_.put("mono8");
@@ -366,7 +336,7 @@ void BagWriter::eye(const StereoImage& image, int number, const std::vector<std:
   message_.put(static_cast<std::uint32_t>(image.width));
   message_.put_length(grey.size());
   message_.put_raw(grey.data(), grey.size());
-  write(topic);
+  stream_.write(topic);
 }
 
 void BagWriter::static_transforms(const VehicleConfig& vehicle) {
@@ -389,7 +359,7 @@ void BagWriter::static_transforms(const VehicleConfig& vehicle) {
   for (const Mount& mount : mounts) {
     put_transform(static_transforms_, 0, kBodyFrame, mount.frame, mount.X_B);
   }
-  write(static_transforms_);
+  stream_.write(static_transforms_);
 }
 
 }  // namespace arex::sim

@@ -4,13 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "bag/message_file.h"
+#include "bag/display_writer.h"
+#include "bag/message_stream.h"
 #include "messages/sensors.h"
 #include "messages/stereo_image.h"
 #include "messages/vehicle.h"
@@ -64,6 +63,8 @@ struct BagOptions {
 /// their line, their time and zeros, as the driver writes them. A depth that was not measured is
 /// NaN (REP 118).
 ///
+/// What the flight software makes of it stands beside: DisplayWriter.
+///
 /// Further LiDARs and cameras have topics and frames of their names: /NAME/points in NAME_frame,
 /// /NAME/depth and /NAME/camera_info in NAME_optical_frame.
 ///
@@ -80,7 +81,7 @@ class BagWriter {
             const BagOptions& options = {});
 
   /// Sets the clock: what is written from here on arrives at `now`.
-  void begin(Stamp now) { now_ = now; }
+  void begin(Stamp now) { stream_.begin(now); }
   /// To /imu/data, /livox/imu and /imu/mag.
   void imu(const ImuSample& sample);
   void scan(const LidarScan& scan);
@@ -95,15 +96,14 @@ class BagWriter {
   void depth(const DepthImage& image);
   /// @pre its images have width * height values
   void infrared(const StereoImage& image);
+  /// What the flight software makes of it, for viewers.
+  [[nodiscard]] DisplayWriter& display() { return display_; }
   /// Completes FILE. Without it FILE.active remains.
   void close();
 
  private:
-  struct Topic {
-    std::uint32_t connection = 0;
-    std::uint32_t sequence = 0;  ///< of the next header
-  };
-  Topic topic(const std::string& name, const RosMessageType& type, bool latched = false);
+  using Topic = MessageStream::Topic;
+
   /// The topic of a device; made when its first message comes.
   Topic& topic_of(const std::string& device, const char* first, const char* further,
                   const RosMessageType& type);
@@ -114,12 +114,6 @@ class BagWriter {
   };
   /// Writes what waits for O.
   void write_truth();
-  /// Starts message_ with a std_msgs/Header.
-  void begin_message(Topic& topic, Stamp stamp, const std::string& frame);
-  void put_header(Topic& topic, Stamp stamp, const std::string& frame);
-  void put_numbers(std::span<const double> values);
-  /// Writes message_, which arrives now.
-  void write(const Topic& topic) { file_->write(topic.connection, ros_time(now_), message_); }
   void imu_on(Topic& topic, const ImuSample& sample);
   void frame_end(const LidarScan& scan);
   void cloud(const LidarScan& scan, const std::vector<LidarPoint>& points);
@@ -134,9 +128,9 @@ class BagWriter {
   void put_calibration(const PinholeCamera& camera, double baseline_m);
   void static_transforms(const VehicleConfig& vehicle);
 
-  std::unique_ptr<MessageFile> file_;
+  MessageStream stream_;
+  RosBytes& message_;  ///< of the stream
   BagOptions options_;
-  Stamp now_ = 0;
   Topic imu_;
   Topic livox_imu_;
   Topic field_;
@@ -147,7 +141,7 @@ class BagWriter {
   Pose X_WO_;
   bool odom_begun_ = false;
   std::vector<TrueMotion> waiting_;  ///< for O
-  RosBytes message_;                 ///< the one being written
+  DisplayWriter display_;
 };
 
 }  // namespace arex::sim

@@ -104,25 +104,11 @@ const Vec3 kLivoxImu_m{-0.011, -0.02329, 0.04412};
 
 }  // namespace
 
-bool ReplayInput::StampChecks::accept(Stamp stamp) {
-  if (last && stamp == *last) {
-    ++counts.doubled;
-    return false;
-  }
-  if (last && stamp < *last) {
-    ++counts.unordered;
-    return false;
-  }
-  if (last && period > 0 && 2 * (stamp - *last) > 3 * period) {
-    counts.missing += static_cast<std::uint64_t>((stamp - *last + period / 2) / period - 1);
-  }
-  last = stamp;
-  ++counts.used;
-  return true;
-}
-
 ReplayInput::ReplayInput(const std::filesystem::path& file, const ReplayOptions& options)
-    : recording_(file), options_(options), decoder_(options.time_unit) {
+    : recording_(file),
+      options_(options),
+      cameras_(recording_, options.depth_topic, options.infrared_topic),
+      decoder_(options.time_unit) {
   const std::string clouds = "PointCloud2 or CustomMsg", samples = "sensor_msgs/Imu";
   lidar_ = options.lidar_topic.empty()
                ? busiest_topic(recording_, file, is_lidar, clouds)
@@ -142,10 +128,15 @@ ReplayInput::ReplayInput(const std::filesystem::path& file, const ReplayOptions&
     if (topic.type == "tf2_msgs/TFMessage" && topic.name == "/tf_static") transforms_.push_back(i);
   }
   survey();
-  std::vector<std::size_t> read{lidar_, imu_};
-  read.insert(read.end(), frame_ends_.begin(), frame_ends_.end());
-  if (magnetometer_) read.push_back(*magnetometer_);
-  recording_.select(read);
+  use({});
+}
+
+std::string ReplayInput::depth_topic() const {
+  return use_.depth ? name_of(cameras_.depth()->topic) : "";
+}
+
+std::string ReplayInput::infrared_topic() const {
+  return use_.infrared ? name_of(cameras_.infrared()->left) : "";
 }
 
 void ReplayInput::survey() {
@@ -201,10 +192,10 @@ void ReplayInput::survey() {
   accel_factor_ = in_g ? kGravity : 1;
   accel_unit_told_ = options_.accel_unit != AccelUnit::kAuto || in_g ||
                      (usual > 0.5 * kGravity && usual < 2 * kGravity);
-  find_mount(transforms);
+  find_mounts(transforms);
 }
 
-void ReplayInput::find_mount(const std::vector<DecodedTransform>& transforms) {
+void ReplayInput::find_mounts(const std::vector<DecodedTransform>& transforms) {
   const auto bare = [](const std::string& frame) {
     return frame.starts_with('/') ? frame.substr(1) : frame;
   };
@@ -214,99 +205,10 @@ void ReplayInput::find_mount(const std::vector<DecodedTransform>& transforms) {
   } else if (lidar.find("livox") != std::string::npos) {
     X_BL_ = Pose{Mat3::Identity(), kLivoxImu_m};
   }
-}
-
-Stamp ReplayInput::run_time(Stamp recorded) const {
-  return recorded == kRosZero ? 0 : recorded - origin_;
-}
-
-std::optional<Arrival> ReplayInput::next() {
-  RecordedMessage message;
-  while (recording_.next(message)) {
-    Arrival arrival;
-    arrival.time = run_time(message.time - clock_shift_);
-    if (message.topic == imu_) {
-      arrival.imu = imu_of(message);
-    } else if (message.topic == lidar_) {
-      arrival.scan = scan_of(message);
-    } else {
-      note_other(message);
-    }
-    if (arrival.imu || arrival.scan) return arrival;
+  if (cameras_.depth()) X_B_depth_ = pose_between(transforms, imu, bare(cameras_.depth()->frame));
+  if (cameras_.infrared()) {
+    X_B_infrared_ = pose_between(transforms, imu, bare(cameras_.infrared()->frame));
   }
-  return std::nullopt;
-}
-
-void ReplayInput::note_other(const RecordedMessage& message) {
-  const WireFormat format = recording_.topics()[message.topic].format;
-  try {
-    if (message.topic == magnetometer_) {
-      DecodedField field = decode_field(message.bytes, format);
-      if (field.frame == imu_frame_) field_ = std::move(field);
-    } else {
-      const auto end = decode_frame_end(message.bytes, format);
-      if (end && end->frame == lidar_frame_) frame_end_ = end;
-    }
-  } catch (const DecodeError&) {
-    // Without a field the IMU has six axes; without its end a frame ends with its last point.
-  }
-}
-
-std::optional<ImuSample> ReplayInput::imu_of(const RecordedMessage& message) {
-  try {
-    ImuSample sample = decode_imu(message.bytes, recording_.topics()[imu_].format).sample;
-    if (!imu_checks_.accept(sample.stamp)) return std::nullopt;
-    constexpr Stamp kSameMoment = kNanosecondsPerSecond / 20;
-    if (field_ && std::abs(sample.stamp - field_->stamp) <= kSameMoment) {
-      sample.field_gauss = field_->gauss;
-    }
-    sample.stamp = run_time(sample.stamp);
-    // A product with one changes nothing, to the last bit.
-    sample.accel_mps2 *= accel_factor_;
-    return sample;
-  } catch (const DecodeError&) {
-    ++imu_checks_.counts.damaged;
-    return std::nullopt;
-  }
-}
-
-LidarScanPtr ReplayInput::scan_of(const RecordedMessage& message) {
-  const RecordedTopic& topic = recording_.topics()[lidar_];
-  try {
-    DecodedScan decoded = decoder_.decode(topic.type, message.bytes, topic.format);
-    if (!scan_checks_.accept(decoded.header_stamp)) return nullptr;
-    LidarScan& scan = *decoded.scan;
-    Stamp end = run_time(scan.end);
-    if (frame_end_ && frame_end_->stamp == decoded.header_stamp) end = run_time(frame_end_->end);
-    scan.stamp = run_time(scan.stamp);
-    scan.end = std::max(end, scan.stamp + 1);
-    return decoded.scan;
-  } catch (const DecodeError&) {
-    ++scan_checks_.counts.damaged;
-    return nullptr;
-  }
-}
-
-std::vector<StampedPose> ReplayInput::read_truth() {
-  std::vector<StampedPose> poses;
-  if (!truth_) return poses;
-  recording_.select({*truth_});
-  const RecordedTopic& topic = recording_.topics()[*truth_];
-  RecordedMessage message;
-  while (recording_.next(message)) {
-    try {
-      const DecodedPose pose = decode_pose(topic.type, message.bytes, topic.format);
-      poses.push_back({run_time(pose.stamp), pose.X});
-    } catch (const DecodeError&) {
-      // One pose fewer to compare with.
-    }
-  }
-  std::stable_sort(poses.begin(), poses.end(),
-                   [](const auto& a, const auto& b) { return a.stamp < b.stamp; });
-  const auto same = std::unique(poses.begin(), poses.end(),
-                                [](const auto& a, const auto& b) { return a.stamp == b.stamp; });
-  poses.erase(same, poses.end());
-  return poses;
 }
 
 std::vector<std::string> ReplayInput::notes() const {
@@ -314,8 +216,11 @@ std::vector<std::string> ReplayInput::notes() const {
   const auto say = [&](const std::string& topic, std::uint64_t count, const char* what) {
     if (count > 0) notes.push_back(topic + ": " + std::to_string(count) + " messages " + what);
   };
-  for (const auto& [topic, counts] :
-       {std::pair(imu_, imu_checks_.counts), std::pair(lidar_, scan_checks_.counts)}) {
+  std::vector<std::pair<std::size_t, MessageCounts>> streams{{imu_, imu_checks_.counts},
+                                                             {lidar_, scan_checks_.counts}};
+  if (use_.depth) streams.emplace_back(cameras_.depth()->topic, depth_checks_.counts);
+  if (use_.infrared) streams.emplace_back(cameras_.infrared()->left, infrared_checks_.counts);
+  for (const auto& [topic, counts] : streams) {
     say(name_of(topic), counts.damaged, "cannot be read");
     say(name_of(topic), counts.unordered, "came behind later ones and were left out");
     say(name_of(topic), counts.doubled, "came twice");

@@ -2,11 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "bag/arrival_queue.h"
+#include "bag/recorded_cameras.h"
 #include "bag/recording.h"
 #include "bag/sensor_decoder.h"
 #include "messages/sensors.h"
@@ -17,9 +18,11 @@ enum class AccelUnit : std::uint8_t { kAuto, kG, kMps2 };
 
 /// What of a recording is replayed, and how its numbers are meant.
 struct ReplayOptions {
-  std::string lidar_topic;  ///< empty: of those with a fitting type the one with most messages
-  std::string imu_topic;    ///< likewise
-  std::string truth_topic;  ///< empty: of those with poses the first whose name says so
+  std::string lidar_topic;     ///< empty: of those with a fitting type the one with most messages
+  std::string imu_topic;       ///< likewise
+  std::string truth_topic;     ///< empty: of those with poses the first whose name says so
+  std::string depth_topic;     ///< empty: see RecordedCameras
+  std::string infrared_topic;  ///< of the left eye; likewise
   AccelUnit accel_unit = AccelUnit::kAuto;
   TimeUnit time_unit = TimeUnit::kAuto;
 };
@@ -33,11 +36,11 @@ struct MessageCounts {
   std::uint64_t missing = 0;    ///< that gaps between stamps tell
 };
 
-/// What arrives at one moment.
-struct Arrival {
-  Stamp time = 0;
-  std::optional<ImuSample> imu;
-  LidarScanPtr scan;
+/// Which cameras are replayed, and what their images are handed on with.
+struct CameraUse {
+  bool depth = false, infrared = false;
+  std::string depth_device;  ///< DepthImage::device
+  Pose X_BC;                 ///< of the left infrared eye
 };
 
 struct StampedPose {
@@ -56,7 +59,11 @@ class ReplayInput {
   /// @throws ConfigError for a topic that is not there, and where none fits.
   ReplayInput(const std::filesystem::path& file, const ReplayOptions& options);
 
-  /// The next sample or scan. @return nothing at the end.
+  /// Has the images of cameras replayed, too. Not to be called after next().
+  /// @pre the recording has those asked for
+  void use(const CameraUse& use);
+
+  /// The next sample, scan or exposure. @return nothing at the end.
   std::optional<Arrival> next();
 
   /// Poses of the recording's truth in order of time; empty if it has none. Not to be called
@@ -66,6 +73,10 @@ class ReplayInput {
   /// The LiDAR's frame in the IMU's: from /tf_static; of a Livox that stamps both with one frame
   /// that of the maker; otherwise unknown.
   [[nodiscard]] const std::optional<Pose>& X_BL() const { return X_BL_; }
+  [[nodiscard]] const RecordedCameras& cameras() const { return cameras_; }
+  /// Their frames in the IMU's, from /tf_static; nothing: unknown, or there is no such camera.
+  [[nodiscard]] const std::optional<Pose>& X_B_depth() const { return X_B_depth_; }
+  [[nodiscard]] const std::optional<Pose>& X_B_infrared() const { return X_B_infrared_; }
   /// The frames that it would be known for.
   [[nodiscard]] const std::string& imu_frame() const { return imu_frame_; }
   [[nodiscard]] const std::string& lidar_frame() const { return lidar_frame_; }
@@ -75,8 +86,16 @@ class ReplayInput {
   [[nodiscard]] const std::string& lidar_topic() const { return name_of(lidar_); }
   [[nodiscard]] const std::string& imu_topic() const { return name_of(imu_); }
   [[nodiscard]] std::string truth_topic() const { return truth_ ? name_of(*truth_) : ""; }
+  /// Empty where they are not replayed.
+  [[nodiscard]] std::string depth_topic() const;
+  [[nodiscard]] std::string infrared_topic() const;
   [[nodiscard]] const MessageCounts& imu_counts() const { return imu_checks_.counts; }
   [[nodiscard]] const MessageCounts& lidar_counts() const { return scan_checks_.counts; }
+  [[nodiscard]] const MessageCounts& depth_counts() const { return depth_checks_.counts; }
+  /// Of the left eye.
+  [[nodiscard]] const MessageCounts& infrared_counts() const { return infrared_checks_.counts; }
+  /// Points that were no returns: zeros, as drivers write what a firing missed, or no numbers.
+  [[nodiscard]] std::uint64_t lidar_misses() const { return lidar_misses_; }
   [[nodiscard]] const RecordingDamage& damage() const { return recording_.damage(); }
   /// What a reader of the results should know; a sentence each.
   [[nodiscard]] std::vector<std::string> notes() const;
@@ -95,10 +114,15 @@ class ReplayInput {
     return recording_.topics()[topic].name;
   }
   void survey();
-  void find_mount(const std::vector<DecodedTransform>& transforms);
+  void find_mounts(const std::vector<DecodedTransform>& transforms);
+  /// Takes one message. @return whether there was one more.
+  bool take();
   std::optional<ImuSample> imu_of(const RecordedMessage& message);
   void note_other(const RecordedMessage& message);
   LidarScanPtr scan_of(const RecordedMessage& message);
+  DepthImagePtr depth_of(const RecordedMessage& message);
+  void take_left(const RecordedMessage& message, Stamp time);
+  void take_right(const RecordedMessage& message, Stamp time);
   [[nodiscard]] Stamp run_time(Stamp recorded) const;
 
   Recording recording_;
@@ -107,16 +131,20 @@ class ReplayInput {
   std::optional<std::size_t> truth_;
   std::optional<std::size_t> magnetometer_;
   std::vector<std::size_t> frame_ends_, transforms_;
+  RecordedCameras cameras_;
+  CameraUse use_;
   ScanDecoder decoder_;
   double accel_factor_ = 1;  ///< to m/s^2
   bool accel_unit_told_ = true;
   std::string imu_frame_, lidar_frame_;
-  std::optional<Pose> X_BL_;
+  std::optional<Pose> X_BL_, X_B_depth_, X_B_infrared_;
   Stamp origin_ = 0;
   Stamp clock_shift_ = 0;  ///< of arrivals behind stamps, by the clocks' difference
   std::optional<DecodedFrameEnd> frame_end_;  ///< the newest
   std::optional<DecodedField> field_;         ///< likewise, in the IMU's frame
-  StampChecks imu_checks_, scan_checks_;
+  StampChecks imu_checks_, scan_checks_, depth_checks_, infrared_checks_;
+  std::uint64_t lidar_misses_ = 0;
+  ArrivalQueue queue_;
 };
 
 }  // namespace arex::sim

@@ -30,7 +30,14 @@ TOPICS = {"/imu/data": ("sensor_msgs/Imu", 200), "/imu/mag": ("sensor_msgs/Magne
           "/livox/frame_end": ("sensor_msgs/TimeReference", 10),
           "/tf": ("tf2_msgs/TFMessage", 200), "/truth": ("nav_msgs/Odometry", 200), "/camera/depth": ("sensor_msgs/Image", 3),
           "/camera/camera_info": ("sensor_msgs/CameraInfo", 3),
-          "/tf_static": ("tf2_msgs/TFMessage", 1)}
+          "/tf_static": ("tf2_msgs/TFMessage", 1),
+          "/map": ("nav_msgs/OccupancyGrid", 1), "/map_cloud": ("sensor_msgs/PointCloud2", 1),
+          "/local_grid": ("sensor_msgs/PointCloud2", 1), "/path": ("nav_msgs/Path", 1),
+          "/plan": ("nav_msgs/Path", 1), "/targets": ("visualization_msgs/MarkerArray", 1),
+          "/decisions": ("visualization_msgs/MarkerArray", 1),
+          "/vehicle": ("visualization_msgs/MarkerArray", 1), "/rosout": ("rosgraph_msgs/Log", 1)}
+LATCHED = {"/tf_static", "/map", "/map_cloud", "/targets", "/vehicle"}
+END = 199 * IMU
 
 
 def expect(actual, wanted, what):
@@ -165,7 +172,82 @@ def check_static_tf(_, time, m):
             sys.exit(f"{frame}: rotation {q}")
 
 
-CHECKS = {"/imu/data": check_imu, "/livox/imu": check_imu, "/imu/mag": check_field,
+def check_map(_, time, m):
+    check_header(m.header, 0, END, "odom", "map")
+    expect((time, m.info.map_load_time.to_nsec(), m.info.resolution, m.info.width, m.info.height,
+            xyz(m.info.origin.position), m.info.origin.orientation.w, m.data),
+           (END, END, 0.5, 3, 2, (-1, -2, 0), 1, (-1, 0, 100, 0, 100, -1)), "map")
+
+
+def check_cloud(points):
+    def check(_, time, m):
+        check_header(m.header, 0, END, "odom", "cloud")
+        expect((m.height, m.width, m.point_step, m.row_step),
+               (1, len(points), 12, 12 * len(points)), "cloud")
+        expect([(f.name, f.offset, f.datatype, f.count) for f in m.fields], XYZI[:3], "its fields")
+        expect(list(struct.iter_unpack("<fff", m.data)), points, "its points")
+    return check
+
+
+def check_path(frame_times, positions):
+    def check(_, time, m):
+        check_header(m.header, 0, END, "odom", "path")
+        expect([(p.header.frame_id, p.header.stamp.to_nsec(), xyz(p.pose.position))
+                for p in m.poses],
+               [("odom", t, p) for t, p in zip(frame_times, positions)], "path")
+    return check
+
+
+def check_markers(frame, wanted):
+    """Of each: name, number, shape, position, size, text; the first takes away what was shown."""
+    def check(_, time, m):
+        markers = m.markers
+        if frame == "odom":
+            expect(markers[0].action, 3, "the first marker deletes all")
+            markers = markers[1:]
+        expect([(k.ns, k.id, k.type, xyz(k.pose.position), xyz(k.scale), k.text)
+                for k in markers], wanted, "markers")
+        for k in markers:
+            expect((k.header.frame_id, k.header.stamp.to_nsec(), k.action, k.frame_locked,
+                    k.lifetime.to_nsec(), k.pose.orientation.w, k.color.a > 0),
+                   (frame, END, 0, True, 0, 1, True), k.ns)
+    return check
+
+
+BOX, SPHERE, CYLINDER, LINE, TEXT = 1, 2, 3, 4, 9
+SMALL, LARGE, LETTERS = 3 * (0.3,), 3 * (0.6,), 3 * (0.35,)
+TARGETS = [("reached", 0, SPHERE, (4, 5, 6), SMALL, ""),
+           ("numbers", 0, TEXT, (4, 5, 6.3), LETTERS, "1"),
+           ("goal", 0, SPHERE, (1.5, 2, 3), LARGE, "")]
+DECISION = [("near_obstacle", 0, SPHERE, (0, 1, 1.5), SMALL, ""),
+            ("kept", 1, SPHERE, (2, 3, 1.5), LARGE, ""),
+            ("chosen", 1, LINE, (0, 0, 0), (0.05, 0, 0), ""),
+            ("kept", 2, SPHERE, (4, 3, 1.5), SMALL, ""),
+            ("revenue", 2, TEXT, (4, 3, 1.8), LETTERS, "1.25"),
+            ("decision", 0, TEXT, (2, 3, 1.8), LETTERS,
+             "new_target\nrevenue 3.75\nf_I 12.2 m2, f_N 4.5 m, f_D 0.50")]
+VEHICLE = [("vehicle", 0, CYLINDER, (0.25, 0, -0.5), (0.5, 0.5, 0.125), "")]
+
+
+def check_decision(i, time, m):
+    check_markers("odom", DECISION)(i, time, m)
+    expect([xyz(p) for p in m.markers[3].points], [(2, 2, 1.5), (2, 3, 1.5)], "the line of sight")
+
+
+def check_log(_, time, m):
+    check_header(m.header, 0, END, "", "log")
+    expect((time, m.level, m.name, m.msg, m.topics), (END, m.ERROR, "arex", "stuck: no_path", []),
+           "log")
+
+
+CHECKS = {"/map": check_map,
+          "/map_cloud": check_cloud([(0.25, 0, 1), (0.5, -1, 1), (0.75, -2, 1)]),
+          "/local_grid": check_cloud([(1.25, 2.75, 3.25), (1.75, 2.75, 3.75)]),
+          "/path": check_path((ZERO, END), [(0, 0, 1.5), (0.5, -0.25, 1.5)]),
+          "/plan": check_path((END, END), [(1, 2, 3), (1.5, 2, 3)]),
+          "/targets": check_markers("odom", TARGETS), "/decisions": check_decision,
+          "/vehicle": check_markers("base_link", VEHICLE), "/rosout": check_log,
+          "/imu/data": check_imu, "/livox/imu": check_imu, "/imu/mag": check_field,
           "/livox/lidar": check_scan, "/livox/frame_end": check_frame_end, "/truth": check_truth,
           "/camera/depth": check_depth, "/camera/camera_info": check_camera_info,
           "/tf": check_tf, "/tf_static": check_static_tf}
@@ -182,7 +264,7 @@ def check_types(bag):
             expect(c.md5sum, "e4d6829bdfe657cb6c21a746c86b21a6", f"{c.datatype} md5")
         else:
             expect(c.md5sum, debian._md5sum, f"{c.datatype} md5")
-        expect(c.header.get("latching"), b"1" if c.topic == "/tf_static" else None,
+        expect(c.header.get("latching"), b"1" if c.topic in LATCHED else None,
                f"{c.topic} latching")
 
 

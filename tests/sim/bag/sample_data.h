@@ -65,6 +65,61 @@ inline Pose true_pose(int i) {
   return X_OB;
 }
 
+/// One message of each kind of what viewers show.
+inline void write_display(DisplayWriter& display, Stamp now) {
+  OccupancyMap2D map;
+  map.origin = {-1, -2};
+  map.resolution = 0.5;
+  map.width = 3;
+  map.height = 2;
+  map.cells = {-1, 0, 1, 0, 1, -1};
+  display.map(now, map);
+  const std::vector<Vec3f> cloud{{0.25F, 0, 1}, {0.5F, -1, 1}, {0.75F, -2, 1}};
+  display.cloud(now, cloud);
+  // Of 2 x 2 x 2 cells the second and the last; y runs fastest, then x.
+  const std::vector<std::uint8_t> cells{0,
+                                        GridView::kOccupied | GridView::kKnown,
+                                        0,
+                                        0,
+                                        0,
+                                        0,
+                                        GridView::kInflated,
+                                        GridView::kBlocked};
+  display.grid(now, {cells.data(), {1, 2, 3}, 0.5, {2, 2, 2}});
+  const std::vector<PathPose> path{{0, true_pose(0)}, {now, true_pose(1)}};
+  display.path(now, path);
+  const std::vector<Vec3> plan{{1, 2, 3}, {1.5, 2, 3}};
+  display.plan(now, plan);
+  const std::vector<Vec3> reached{{4, 5, 6}};
+  display.targets(now, reached, &plan.back());
+  Decision decision;
+  decision.stamp = now;
+  decision.kind = DecisionKind::kNewTarget;
+  decision.target = {2, 3};
+  decision.candidates.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Candidate& c = decision.candidates[i];
+    const auto k = static_cast<double>(i);
+    c.point = {2 * k, i == 0 ? 1 : 3};
+    c.viewpoint = {2 * k, 2};
+    c.verdict = i == 0 ? Verdict::kNearObstacle : Verdict::kKept;
+    c.information_m2 = 12.25;
+    c.distance_m = 4.5;
+    c.direction = 0.5;
+    c.revenue = 6.25 - 2.5 * k;
+  }
+  decision.winner = 1;
+  display.decision(decision, 1.5);
+  const std::vector<Marker> solids{{"vehicle",
+                                    0,
+                                    Marker::Shape::kCylinder,
+                                    {Mat3::Identity(), {0.25, 0, -0.5}},
+                                    {0.5, 0.5, 0.125},
+                                    {0.5F, 0.25F, 0.75F, 1}}};
+  display.vehicle(now, solids);
+  display.event({now, EventKind::kStuck, "no_path"});
+}
+
 inline void write_samples(BagWriter& bag) {
   bag.place_odom(Pose(), true);
   for (int i = 0; i < kImuSamples; ++i) {
@@ -80,6 +135,7 @@ inline void write_samples(BagWriter& bag) {
     if (i < kDepthImages) bag.depth(depth_image(i));
   }
   bag.scan(lidar_scan(kScans - 1));
+  write_display(bag.display(), (kImuSamples - 1) * kImuPeriod);
 }
 
 }  // namespace arex::sim::test

@@ -6,6 +6,8 @@ import { readFile } from "node:fs/promises";
 import { deepStrictEqual as expectEqual, ok as expect } from "node:assert";
 
 import { parse } from "@foxglove/rosmsg";
+import standard from "@foxglove/rosmsg-msgs-common";
+import decompressLz4 from "@foxglove/wasm-lz4";
 import { MessageReader } from "@foxglove/rosmsg2-serialization";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 
@@ -38,7 +40,7 @@ function checkScan(m, i, time) {
   checkHeader(m.header, i * SCAN, "livox_frame");
   expectEqual(time, arrivalOfScan(i));
   const count = i === 9 ? 0 : 20_000 - i;
-  if (layout === "livox_custom2") {
+  if (layout.startsWith("livox_custom")) {
     expectEqual([Number(m.timebase), m.point_num, m.points.length], [i * SCAN, count, count]);
     m.points.forEach((p, k) =>
       checkPoint([p.x, p.y || 0, p.z, p.reflectivity, p.offset_time, p.line, p.tag], i, k));
@@ -99,8 +101,68 @@ function checkMounts(m) {
     [["livox_frame", [0.15, 0, 0.01]], ["camera_depth_optical_frame", [0.14, 0, 0.07]]]);
 }
 
-const scanType = layout === "livox_custom2" ? "livox_ros_driver2/msg/CustomMsg"
-  : "sensor_msgs/msg/PointCloud2";
+const END = 199 * IMU;
+
+function checkMap(m, i, time) {
+  checkHeader(m.header, END, "odom");
+  expectEqual([time, nanoseconds(m.info.map_load_time), m.info.resolution, m.info.width,
+    m.info.height, xyz(m.info.origin.position), m.info.origin.orientation.w, Array.from(m.data)],
+  [END, END, 0.5, 3, 2, [-1, -2, 0], 1, [-1, 0, 100, 0, 100, -1]]);
+}
+
+const checkCloud = (points) => (m) => {
+  checkHeader(m.header, END, "odom");
+  expectEqual([m.height, m.width, m.point_step, m.fields.map((f) => f.name)],
+    [1, points.length, 12, ["x", "y", "z"]]);
+  const view = new DataView(m.data.buffer, m.data.byteOffset, m.data.byteLength);
+  points.forEach((point, k) => expectEqual(
+    [0, 4, 8].map((offset) => view.getFloat32(12 * k + offset, true)), point));
+};
+
+const checkPath = (times, positions) => (m) => {
+  checkHeader(m.header, END, "odom");
+  expectEqual(m.poses.map((p) => [p.header.frame_id, nanoseconds(p.header.stamp),
+    xyz(p.pose.position)]), positions.map((p, k) => ["odom", times[k], p]));
+};
+
+// Of each: name, number, shape, position, size, text; the first takes away what was shown.
+const checkMarkers = (frame, wanted) => (m) => {
+  const markers = m.markers.slice(frame === "odom" ? 1 : 0);
+  if (frame === "odom") expectEqual(m.markers[0].action, 3);
+  expectEqual(markers.map((k) => [k.ns, k.id, k.type, xyz(k.pose.position), xyz(k.scale), k.text]),
+    wanted);
+  for (const k of markers) {
+    checkHeader(k.header, END, frame);
+    expectEqual([k.action, k.frame_locked, k.lifetime.sec, k.pose.orientation.w, k.mesh_resource,
+      k.texture.format, k.uv_coordinates.length, k.mesh_file.filename, k.mesh_file.data.length,
+      k.mesh_use_embedded_materials], [0, true, 0, 1, "", "", 0, "", 0, false]);
+    expect(k.color.a > 0);
+  }
+};
+
+const BOX = 1, SPHERE = 2, CYLINDER = 3, LINE = 4, TEXT = 9;
+const SMALL = [0.3, 0.3, 0.3], LARGE = [0.6, 0.6, 0.6], LETTERS = [0.35, 0.35, 0.35];
+const TARGETS = [["reached", 0, SPHERE, [4, 5, 6], SMALL, ""],
+  ["numbers", 0, TEXT, [4, 5, 6.3], LETTERS, "1"], ["goal", 0, SPHERE, [1.5, 2, 3], LARGE, ""]];
+const DECISION = [["near_obstacle", 0, SPHERE, [0, 1, 1.5], SMALL, ""],
+  ["kept", 1, SPHERE, [2, 3, 1.5], LARGE, ""], ["chosen", 1, LINE, [0, 0, 0], [0.05, 0, 0], ""],
+  ["kept", 2, SPHERE, [4, 3, 1.5], SMALL, ""],
+  ["revenue", 2, TEXT, [4, 3, 1.8], LETTERS, "1.25"],
+  ["decision", 0, TEXT, [2, 3, 1.8], LETTERS,
+    "new_target\nrevenue 3.75\nf_I 12.2 m2, f_N 4.5 m, f_D 0.50"]];
+const VEHICLE = [["vehicle", 0, CYLINDER, [0.25, 0, -0.5], [0.5, 0.5, 0.125], ""]];
+
+function checkDecision(m) {
+  checkMarkers("odom", DECISION)(m);
+  expectEqual(m.markers[3].points.map(xyz), [[2, 2, 1.5], [2, 3, 1.5]]);
+}
+
+function checkLog(m) {
+  expectEqual([nanoseconds(m.stamp), m.level, m.name, m.msg], [END, 40, "arex", "stuck: no_path"]);
+}
+
+const scanType = { livox_custom: "livox_ros_driver/msg/CustomMsg",
+  livox_custom2: "livox_ros_driver2/msg/CustomMsg" }[layout] ?? "sensor_msgs/msg/PointCloud2";
 const TOPICS = {
   "/imu/data": ["sensor_msgs/msg/Imu", 200, checkImu],
   "/livox/imu": ["sensor_msgs/msg/Imu", 200, checkImu],
@@ -112,14 +174,39 @@ const TOPICS = {
   "/camera/camera_info": ["sensor_msgs/msg/CameraInfo", 3, checkCamera],
   "/tf": ["tf2_msgs/msg/TFMessage", 200, checkTransform],
   "/tf_static": ["tf2_msgs/msg/TFMessage", 1, checkMounts],
+  "/map": ["nav_msgs/msg/OccupancyGrid", 1, checkMap],
+  "/map_cloud": ["sensor_msgs/msg/PointCloud2", 1,
+    checkCloud([[0.25, 0, 1], [0.5, -1, 1], [0.75, -2, 1]])],
+  "/local_grid": ["sensor_msgs/msg/PointCloud2", 1,
+    checkCloud([[1.25, 2.75, 3.25], [1.75, 2.75, 3.75]])],
+  "/path": ["nav_msgs/msg/Path", 1, checkPath([1, END], [[0, 0, 1.5], [0.5, -0.25, 1.5]])],
+  "/plan": ["nav_msgs/msg/Path", 1, checkPath([END, END], [[1, 2, 3], [1.5, 2, 3]])],
+  "/targets": ["visualization_msgs/msg/MarkerArray", 1, checkMarkers("odom", TARGETS)],
+  "/decisions": ["visualization_msgs/msg/MarkerArray", 1, checkDecision],
+  "/vehicle": ["visualization_msgs/msg/MarkerArray", 1, checkMarkers("base_link", VEHICLE)],
+  "/rosout": ["rcl_interfaces/msg/Log", 1, checkLog],
 };
+
+// The fields of a definition, as ROS 2 Humble has them: rosbag2 plays what lies as these say.
+function checkFields(definitions) {
+  for (const { name, definitions: fields } of definitions) {
+    const official = standard.ros2humble[name ?? ""];
+    if (!official) continue;  // of Livox's drivers
+    const own = (list) => list.filter((f) => !f.isConstant)
+      .map((f) => [f.type, f.name, f.isArray ?? false, f.arrayLength ?? 0]);
+    expectEqual(own(fields), own(official.definitions), name);
+  }
+}
+
+await decompressLz4.isLoaded;
+const decompressHandlers = { lz4: (packed, size) => decompressLz4(packed, Number(size)) };
 
 // By the summary and its indexes, as players read it. It checks the checksums, too.
 const readable = {
   size: async () => BigInt(bytes.length),
   read: async (offset, size) => bytes.subarray(Number(offset), Number(offset + size)),
 };
-const indexed = await McapIndexedReader.Initialize({ readable });
+const indexed = await McapIndexedReader.Initialize({ readable, decompressHandlers });
 expectEqual([indexed.header.profile, indexed.header.library], ["ros2", "arex"]);
 expectEqual(Number(indexed.statistics.messageCount),
   Object.values(TOPICS).reduce((sum, [, count]) => sum + count, 0));
@@ -130,7 +217,10 @@ for (const [id, channel] of indexed.channelsById) {
     ["cdr", "ros2msg", TOPICS[channel.topic][0]]);
   expectEqual(Number(indexed.statistics.channelMessageCounts.get(id)), TOPICS[channel.topic][1]);
   const text = new TextDecoder().decode(schema.data);
-  decoders.set(id, new MessageReader(parse(text, { ros2: true })));
+  const definitions = parse(text, { ros2: true });
+  checkFields([{ ...definitions[0], name: schema.name.replace("/msg/", "/") },
+    ...definitions.slice(1)]);
+  decoders.set(id, new MessageReader(definitions));
 }
 const latched = [...indexed.channelsById.values()].find((c) => c.topic === "/tf_static");
 expect(latched.metadata.get("offered_qos_profiles").includes("durability: 1"));
@@ -154,7 +244,7 @@ expectEqual(seen, Object.fromEntries(Object.keys(seen).map((topic) => [topic, TO
 expectEqual(Object.keys(seen).length, Object.keys(TOPICS).length);
 
 // And from the beginning on, record by record.
-const stream = new McapStreamReader({ validateCrcs: true });
+const stream = new McapStreamReader({ validateCrcs: true, decompressHandlers });
 stream.append(bytes);
 let messages = 0;
 for (let record; (record = stream.nextRecord()); ) messages += record.type === "Message";

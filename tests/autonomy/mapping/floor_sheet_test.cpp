@@ -160,6 +160,37 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
   }
 }
 
+// Kerbs and walls along a ramp lift the planes beside them, across it: its end, which is not seen
+// from its top, still goes on downwards, as far as the hall's floor.
+TEST(FloorSheet, GoesOnDownARampAndNotAcrossIt) {
+  const double slope = std::tan(M_PI / 6);
+  const auto ramp = [&](double x) { return -slope * (x - 24); };
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    for (int x = 24; x < 240; ++x) {
+      for (int y = 0; y < 160; ++y) {
+        std::vector<int>& layers = site.at(x, y);
+        if (x < 172) std::erase_if(layers, [](int layer) { return layer < -50; });  // not seen
+        if (x < 110 && y >= 56 && y < 64) {
+          layers = {static_cast<int>(std::floor(ramp(x) + 0.38 * (64 - y)))};
+        }
+      }
+    }
+    site.give_to(sheet);
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    ASSERT_NEAR(sheet.plane(tile(12, 7))->rise.y(), -0.38, 0.02);
+    for (int x = 3; x < 20; ++x) {
+      for (int y = 8; y < 13; ++y) {
+        EXPECT_EQ(sheet.is_seen(tile(x, y)), 8 * x + 4 < 110) << x << " " << y;
+        EXPECT_NEAR(height(sheet, x, y), ramp(8 * x + 4), 6) << x << " " << y;
+      }
+    }
+    for (int y = 7; y < 13; ++y) EXPECT_NEAR(height(sheet, 23, y), -80, 1) << y;
+  }
+}
+
 // From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
 TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
   FloorSheet sheet = make_sheet();

@@ -48,6 +48,14 @@ TilePlane shifted(const TilePlane& plane, const Eigen::Vector2i& step) {
   return there;
 }
 
+/// Whether a floor goes down steeply that way, and more so than sideways: kerbs and walls along a
+/// ramp tilt the planes beside them, across it.
+bool dives(const TilePlane& plane, const Eigen::Vector2i& step) {
+  const double fall = -plane.rise.dot(step.cast<double>());
+  const double across = std::abs(plane.rise.x() * step.y() - plane.rise.y() * step.x());
+  return kBrickCells * fall >= kDive && fall >= across;
+}
+
 bool say_the_same(const TilePlane& a, const TilePlane& b) {
   constexpr double kEnd = kBrickCells - 1;
   for (const double x : {0.0, kEnd}) {
@@ -209,9 +217,7 @@ void FloorSheet::join_seen() {
       if (before.seen && expected.height > before.plane.height - kBrink) continue;
       Label label = go_on(tiles_[t].label, step, there);
       if (!label.seen) {
-        const bool dives = s < 4 && label.guessed <= kMostDived &&
-                           expected.height <= tiles_[t].label.plane.height - kDive;
-        if (!dives) continue;
+        if (s >= 4 || label.guessed > kMostDived || !dives(tiles_[t].label.plane, step)) continue;
         label.plane = expected;
       }
       const double above = label.plane.height - before.plane.height;

@@ -10,9 +10,10 @@
 namespace arex {
 namespace {
 
-constexpr int kLeastForSlope = 12;          ///< columns
-constexpr double kLeastSpread = 1.5;        ///< variance of their places, columns^2
-constexpr double kLeastIndependence = 0.3;  ///< of those along x and y: 1 - squared correlation
+constexpr int kLeastForSlope = 12;  ///< columns
+/// What the expected rise weighs against the samples, columns^2: a layer's noise (0.5) over what
+/// the rise changes from one tile to the next (0.1 layers per column), squared.
+constexpr double kExpectedRise = 25;
 constexpr double kOutlier_layers = 1.5;
 /// Feet further than this from all that is expected of a tile are none of its floor: it rises by a
 /// layer a column at most, from somewhere within the tolerance.
@@ -71,7 +72,8 @@ Samples samples_of(std::span<const FloorSheet::Feet> feet,
   return samples;
 }
 
-/// Least squares; along axes on which the samples say nothing, with the rise expected there.
+/// Least squares, with the rise expected before the samples are looked at: a few of them, or a row
+/// along one axis, tell a height and no slope.
 TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
   const auto n = static_cast<double>(samples.count);
   Sample mean;
@@ -80,21 +82,18 @@ TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
     mean.y += s.y / n;
     mean.layer += s.layer / n;
   }
-  double xx = 0, yy = 0, xy = 0, xz = 0, yz = 0;
+  double xx = kExpectedRise, yy = kExpectedRise, xy = 0, xz = 0, yz = 0;
   for (const Sample& s : samples.all()) {
-    const double x = s.x - mean.x, y = s.y - mean.y, z = s.layer - mean.layer;
-    xx += x * x / n;
-    yy += y * y / n;
-    xy += x * y / n;
-    xz += x * z / n;
-    yz += y * z / n;
+    const double x = s.x - mean.x, y = s.y - mean.y;
+    const double z = s.layer - mean.layer - expected_rise.x() * x - expected_rise.y() * y;
+    xx += x * x;
+    yy += y * y;
+    xy += x * y;
+    xz += x * z;
+    yz += y * z;
   }
   TilePlane plane;
-  plane.rise = expected_rise;
-  const double determinant = xx * yy - xy * xy;
-  const bool tells = samples.count >= kLeastForSlope && std::min(xx, yy) >= kLeastSpread &&
-                     determinant >= kLeastIndependence * xx * yy;
-  if (tells) plane.rise = Vec2(yy * xz - xy * yz, xx * yz - xy * xz) / determinant;
+  plane.rise = expected_rise + Vec2(yy * xz - xy * yz, xx * yz - xy * xz) / (xx * yy - xy * xy);
   plane.height = mean.layer + plane.rise.x() * (TilePlane::kMiddle - mean.x) +
                  plane.rise.y() * (TilePlane::kMiddle - mean.y);
   return plane;

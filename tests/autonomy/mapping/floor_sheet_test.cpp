@@ -160,6 +160,52 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
   }
 }
 
+// Kerbs and walls along a ramp lift the planes beside them, across it. The end of a ramp, which is
+// not seen from its top, goes on downwards; what lies beside it does not go down with the tilt.
+TEST(FloorSheet, GoesOnDownARampAndNotAcrossIt) {
+  const auto ramp = [](int x, int y) { return 0.5 - 0.5 * (x + 0.5 - 24) + 0.42 * (y - 83.5); };
+  FloorSheet sheet = make_sheet();
+  Site site;
+  site.add(0, 24, 80, 88, [&](int, int) { return 0; });
+  site.add(24, 104, 80, 88, ramp);
+  site.give_to(sheet);
+  sheet.note_place({0, 10}, 13);
+  sheet.spread();
+  ASSERT_NEAR(sheet.plane(tile(12, 10))->rise.y(), 0.42, 0.03);
+  for (int x = 13; x < 20; ++x) {
+    EXPECT_FALSE(sheet.is_seen(tile(x, 10)));
+    EXPECT_NEAR(height(sheet, x, 10), ramp(8 * x + 4, 84), 3) << x;
+  }
+  for (int y = 0; y < kHeight; ++y) EXPECT_GT(height(sheet, 10, y), ramp(84, 84) - 6) << y;
+}
+
+// Where a ramp is seen at a grazing angle few of its columns are.
+TEST(FloorSheet, KnowsTheSlopeOfARampOfWhichLittleIsSeen) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    std::mt19937_64 random(seed);
+    std::bernoulli_distribution seen(0.2);
+    for (int x = 72; x < 152; ++x) {
+      for (int y = 56; y < 104; ++y) {
+        if (!seen(random)) site.at(x, y).clear();
+      }
+    }
+    site.give_to(sheet);
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    for (int x = 10; x < 18; ++x) {
+      for (int y = 8; y < 12; ++y) {
+        EXPECT_NEAR(sheet.plane(tile(x, y))->rise.x(), -slope, 0.15)
+            << seed << ": " << x << " " << y;
+        EXPECT_NEAR(sheet.plane(tile(x, y))->rise.y(), 0, 0.15) << seed << ": " << x << " " << y;
+        EXPECT_NEAR(height(sheet, x, y), -slope * (8 * x + 4 - 24), 2.5);
+      }
+    }
+  }
+}
+
 // From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
 TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
   FloorSheet sheet = make_sheet();

@@ -67,11 +67,18 @@ class SdfReader {
 
   FileScene read() {
     sdf::Console::Instance()->SetQuiet(true);
+    const auto find = [this](const std::string& uri) {
+      std::string path = resolver_.find(uri, file_).string();
+      if (path.empty()) unfound_.insert(uri);
+      return path;
+    };
     sdf::ParserConfig config;
-    config.SetFindCallback(
-        [this](const std::string& uri) { return resolver_.find(uri, file_).string(); });
+    config.SetFindCallback(find);
+    // libsdformat 12 asks this one for what an included model includes.
+    sdf::setFindCallback(find);
     sdf::Root root;
     note_errors(root.Load(file_.string(), config));
+    sdf::setFindCallback([](const std::string&) { return std::string(); });
     scene_.up = FileUp::kZ;
     if (root.WorldCount() > 0) {
       const sdf::World& world = *root.WorldByIndex(0);
@@ -100,12 +107,20 @@ class SdfReader {
       const std::string text = error.Message();
       const bool lookup =
           error.Code() == sdf::ErrorCode::URI_LOOKUP || error.Code() == sdf::ErrorCode::URI_INVALID;
+      const bool told = std::any_of(unfound_.begin(), unfound_.end(), [&](const std::string& uri) {
+        return text.find(uri) != std::string::npos;
+      });
       if (!lookup) {
         complaints_.push_back(text);
-      } else if (text.find("model://ground_plane") != std::string::npos) {
-        add_default_ground();
-      } else if (text.find("model://sun") == std::string::npos) {
+      } else if (!told) {
         missing_.insert(text);
+      }
+    }
+    for (const std::string& uri : unfound_) {
+      if (uri == "model://ground_plane") {
+        add_default_ground();
+      } else if (uri != "model://sun") {
+        missing_.insert(uri);
       }
     }
   }
@@ -347,6 +362,7 @@ class SdfReader {
   FileScene scene_;
   std::map<std::string, Pose> moved_to_;
   std::map<std::string, FileScene> meshes_;
+  std::set<std::string> unfound_;  ///< of the included models
   std::set<std::string> missing_;
   std::vector<std::string> complaints_;
   std::size_t unknown_shapes_ = 0;

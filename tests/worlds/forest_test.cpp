@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include "config/config.h"
 #include "math/random.h"
 #include "worlds/mesh_builder.h"
 
@@ -313,6 +314,59 @@ TEST(Forest, GrowsAMillionLeaves) {
   recipe.tree.leaves = 4200;
   const World world = build(recipe, 1);
   EXPECT_GT(count_class(world, SurfaceClass::kLeaf) / 2, 950000U);
+}
+
+// What is far from where a mission leads is drawn in fewer triangles, as thick and as leafy.
+TEST(Forest, FarTreesAreCoarse) {
+  ForestRecipe recipe;
+  recipe.size_m = {140, 120};
+  recipe.tree.leaves = 60;
+  const Eigen::AlignedBox2d flown(Vec2(-5, -5), Vec2(30, 5));
+  const World full = build(recipe, 5), world = build(recipe, 5, flown);
+  const Eigen::AlignedBox2d detailed = recipe.detailed(flown);
+  EXPECT_EQ(detailed.min(), Vec2(-40, -40));
+  EXPECT_EQ(detailed.max(), Vec2(50, 40));
+
+  struct Tally {
+    std::size_t near = 0, far = 0;
+    std::array<double, kSurfaceClassNames.size()> far_m2{};
+  };
+  constexpr double kCrown = 6;  // reaches over the border, m
+  const auto tally = [&](const World& of) {
+    Tally count;
+    for (std::size_t t = 0; t < of.mesh.triangles.size(); ++t) {
+      const auto& [a, b, c] = of.mesh.triangles[t];
+      const Vec3 p = of.mesh.vertices[a].cast<double>(), q = of.mesh.vertices[b].cast<double>(),
+                 r = of.mesh.vertices[c].cast<double>();
+      const Vec2 middle = ((p + q + r) / 3).head<2>();
+      const double inside = (middle - detailed.min())
+                                .cwiseMin(detailed.max() - middle)
+                                .minCoeff();
+      count.near += inside > kCrown;
+      if (inside > -kCrown) continue;
+      ++count.far;
+      count.far_m2[static_cast<std::size_t>(of.class_of_triangle(t))] +=
+          0.5 * (q - p).cross(r - p).norm();
+    }
+    return count;
+  };
+  const Tally of_full = tally(full), of_coarse = tally(world);
+  EXPECT_EQ(of_coarse.near, of_full.near);
+  EXPECT_LT(of_coarse.far, of_full.far / 2);
+  for (const SurfaceClass c : {SurfaceClass::kTrunk, SurfaceClass::kLeaf, SurfaceClass::kShrub}) {
+    const auto i = static_cast<std::size_t>(c);
+    EXPECT_NEAR(of_coarse.far_m2[i] / of_full.far_m2[i], 1, 0.1) << kSurfaceClassNames[i];
+  }
+  const double expected = recipe.expected_triangles(flown);
+  EXPECT_GT(expected, 0.7 * static_cast<double>(world.mesh.triangles.size()));
+  EXPECT_LT(expected, 2 * static_cast<double>(world.mesh.triangles.size()));
+}
+
+TEST(Forest, AMissionThatLeadsThroughTooMuchIsRefused) {
+  ForestRecipe recipe;
+  recipe.size_m = {300, 300};
+  EXPECT_THROW(build(recipe, 1, Eigen::AlignedBox2d(Vec2(-140, -140), Vec2(140, 140))),
+               ConfigError);
 }
 
 // Of a surveyed stand: 0.18 stems/m^2, 0.22 m mean diameter, 19.4 m high.

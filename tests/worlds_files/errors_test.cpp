@@ -36,6 +36,24 @@ TEST_F(FileErrors, WhatHoldsNothing) {
   expect(said("x.sdf", "<sdf version='1.6'><world name='w'/></sdf>"), "no faces");
   EXPECT_NE(said("x.obj", "# nothing\n"), "");
   EXPECT_NE(said("x.stl", "solid\nendsolid\n"), "");
+  expect(said("y.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), "holds no faces");
+}
+
+TEST_F(FileErrors, WhatWasLeftOutIsSaidWhereNothingIsLeft) {
+  const auto world_with = [](const std::string& body) {
+    return "<sdf version='1.6'><world name='w'>" + body + "</world></sdf>";
+  };
+  const auto shape = [&](const std::string& geometry) {
+    return world_with("<model name='m'><static>1</static><link name='l'><visual name='v'><geometry>" +
+                      geometry + "</geometry></visual></link></model>");
+  };
+  expect(said("a.world", world_with("<include><uri>model://barn</uri></include>")),
+         "no points; 1 files not found and left out (model://barn); see world.file.model_paths");
+  expect(said("b.world", shape("<mesh><uri>model://barn/barn.dae</uri></mesh>")), "barn.dae");
+  expect(said("c.world", shape("<box><size>0 0 0</size></box>")),
+         "0 faces and 1 shapes, all of them without area");
+  expect(said("d.world", shape("<cylinder><radius>-1</radius><length>2</length></cylinder>")),
+         "a shape of negative size");
 }
 
 TEST_F(FileErrors, NumbersThatAreNone) {
@@ -53,7 +71,9 @@ TEST_F(FileErrors, UnitsThatCannotBe) {
       test::mapped(test::room(), [](const Vec3& p) -> Vec3 { return p + Vec3(4e5, 5e6, 100); });
   expect(said("z.ply", test::ply(utm, test::PlyKind::kAscii)), "file.offset_m");
   const auto tiny = test::mapped(test::room(), [](const Vec3& p) { return 1e-3 * p; });
-  EXPECT_NE(said("t.stl", test::stl_binary(tiny)), "");
+  expect(said("t.stl", test::stl_binary(tiny)), "file.scale");
+  expect(said("u.dae", test::collada(test::room(), "Z_UP", 0, Eigen::Matrix4d::Identity())),
+         "a unit of 0 m");
 }
 
 TEST_F(FileErrors, FacesWithoutAreaAreDroppedAndCounted) {

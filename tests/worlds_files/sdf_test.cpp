@@ -142,6 +142,36 @@ TEST(Sdf, IncludesAndMeshesAreFoundAlongThePath) {
   test::expect_surface(with.world, all, 1e-5);
 }
 
+// A model that is included may include others, and say where they stand.
+TEST(Sdf, IncludesStandInIncludedModels) {
+  const TemporaryFolder folder;
+  const auto model = [&](const std::string& name, const std::string& body) {
+    test::write_file(folder / ("models/" + name + "/model.config"),
+                     "<model><name>" + name + "</name><sdf version='1.6'>model.sdf</sdf></model>");
+    test::write_file(folder / ("models/" + name + "/model.sdf"),
+                     "<?xml version='1.0'?><sdf version='1.6'><model name='" + name +
+                         "'><static>1</static>" + body + "</model></sdf>");
+  };
+  model("post",
+        "<link name='l'><pose>3 0 1 0 0 0</pose><visual name='v'><geometry><box><size>1 1 2</size>"
+        "</box></geometry></visual></link>");
+  model("yard",
+        "<include><uri>model://post</uri><pose>1 2 0 0 0 1.5707963267948966</pose></include>"
+        "<include><uri>model://shed</uri></include>"
+        "<link name='l'/>");
+  test::write_file(folder / "x.world",
+                   world_of(kPlane + "<include><uri>model://yard</uri><pose>10 0 0 0 0 0</pose>"
+                                     "</include>"));
+  const FileWorld loaded =
+      load_file_world(test::recipe_of(folder / "x.world"), test::kVehicleRadius);
+  ASSERT_EQ(loaded.world.collision_shapes.size(), 1U);
+  EXPECT_TRUE(loaded.world.collision_shapes[0].X_WS.p.isApprox(Vec3(11, 5, 1), 1e-9));
+  ASSERT_EQ(loaded.notes.size(), 1U);
+  EXPECT_NE(loaded.notes[0].find("1 files not found and left out (model://shed)"),
+            std::string::npos)
+      << loaded.notes[0];
+}
+
 TEST(Sdf, ASavedStateMovesItsModels) {
   const TemporaryFolder folder;
   test::write_file(

@@ -410,6 +410,21 @@ TEST(Scenario, TheExpectedSizeOfAForestIsThatOfTheForest) {
   }
 }
 
+TEST(Scenario, TheFlownAreaIsWhereMissionAndOperatorLead) {
+  const auto area_of = [](const std::vector<std::string>& settings) {
+    return load_scenario({}, settings, {}).config.flown_area();
+  };
+  const auto explored = area_of({"mission.kind=explore", "exploration.bounds.low_m=[-9, 3]",
+                                 "exploration.bounds.high_m=[8, 12]"});
+  EXPECT_EQ(explored.min(), Vec2(-9, 0));
+  EXPECT_EQ(explored.max(), Vec2(8, 12));
+  const auto flown =
+      area_of({"mission.kind=goals", "mission.waypoints_m=[[5, 1, 1], [7, -2, 1]]",
+               "commands=[{at_s: 9, do: go_to, goal_m: [0, 20, 1]}, {at_s: 30, do: land}]"});
+  EXPECT_EQ(flown.min(), Vec2(0, -2));
+  EXPECT_EQ(flown.max(), Vec2(7, 20));
+}
+
 TEST(Scenario, ARecipeWithoutAFreeStartIsAnErrorAtItsLine) {
   const TemporaryFolder folder;
   write_text(folder / "bad.yaml", kWalledIn);

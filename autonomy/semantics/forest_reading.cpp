@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "semantics/ground_model.h"
+#include "semantics/slender_stems.h"
 #include "semantics/stem_detector.h"
 
 namespace arex {
@@ -141,7 +142,7 @@ class NearestStem {
   std::vector<std::vector<std::size_t>> lists_;
 };
 
-void label_stem(const std::vector<Ring>& rings, const ColumnIndex& index,
+void label_stem(const std::vector<Ring>& rings, SemanticClass kind, const ColumnIndex& index,
                 const std::vector<float>& heights, std::vector<SemanticClass>& labels) {
   for (const Ring& ring : rings) {
     index.within(static_cast<float>(ring.centre.x()), static_cast<float>(ring.centre.y()),
@@ -150,7 +151,7 @@ void label_stem(const std::vector<Ring>& rings, const ColumnIndex& index,
                    if (std::abs(h - ring.height) > 0.5 * kStemStep + 1e-6 || h < kGroundThickness) {
                      return;
                    }
-                   labels[i] = SemanticClass::kTrunk;
+                   labels[i] = kind;
                  });
   }
 }
@@ -174,6 +175,18 @@ struct Crown {
   }
 };
 
+SemanticObject post_of(const StemEvidence& e, const Raster& ground, double top) {
+  const double base = ground.interpolate(e.stem.centre.x(), e.stem.centre.y());
+  SemanticObject object;
+  object.kind = SemanticClass::kPillar;
+  object.position = {e.stem.centre.x(), e.stem.centre.y(), base + 0.5 * top};
+  object.size = {2 * e.stem.radius, 2 * e.stem.radius, top};
+  object.base_z = base;
+  object.seen_fraction = e.seen_fraction;
+  object.confidence = e.confidence();
+  return object;
+}
+
 }  // namespace
 
 SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config) {
@@ -183,16 +196,30 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
   reading.labels.assign(cloud.points.size(), SemanticClass::kUnlabelled);
   const std::vector<float>& heights = reading.heights;
   const ColumnIndex index(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
-  const std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
+  std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
+  add_slender_stems(find_slender_stems(cloud, index, heights, config.stem), stems);
+  std::vector<StemEvidence> posts;
+  std::erase_if(stems, [&](const StemEvidence& stem) {
+    const bool post = is_post(stem, cloud, index, heights);
+    if (post) posts.push_back(stem);
+    return post;
+  });
 
   const StemFollower follower(cloud, index, heights);
-  for (const StemEvidence& e : stems) {
+  const auto label = [&](const StemEvidence& e, SemanticClass kind) {
     constexpr double kHighest = 60;
     std::vector<Ring> rings = follower.follow(e.stem, kBreastHeight, kStemStep, kHighest);
     const std::vector<Ring> down =
         follower.follow(e.stem, kBreastHeight - kStemStep, -kStemStep, 0);
     rings.insert(rings.end(), down.begin(), down.end());
-    label_stem(rings, index, heights, reading.labels);
+    label_stem(rings, kind, index, heights, reading.labels);
+    return rings;
+  };
+  for (const StemEvidence& e : stems) label(e, SemanticClass::kTrunk);
+  for (const StemEvidence& e : posts) {
+    double top = kBreastHeight;
+    for (const Ring& ring : label(e, SemanticClass::kPillar)) top = std::max(top, ring.height);
+    reading.objects.push_back(post_of(e, reading.ground, top));
   }
 
   const NearestStem nearest(stems, cloud);
@@ -201,16 +228,16 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
                       std::max(kCanopyCell, WorkingCloud::kCell), 0);
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     const auto h = static_cast<double>(heights[i]);
-    SemanticClass& label = reading.labels[i];
+    SemanticClass& kind = reading.labels[i];
     const Vec2 p = cloud.points[i].head<2>().cast<double>();
     const std::size_t tree = nearest.at(p);
-    if (label == SemanticClass::kUnlabelled) {
-      label = std::abs(h) <= kGroundThickness ? SemanticClass::kGround
-              : h < -kGroundThickness         ? SemanticClass::kUnlabelled
-              : h < kCrownBase                ? SemanticClass::kUndergrowth
-                                              : SemanticClass::kCanopy;
+    if (kind == SemanticClass::kUnlabelled) {
+      kind = std::abs(h) <= kGroundThickness ? SemanticClass::kGround
+             : h < -kGroundThickness         ? SemanticClass::kUnlabelled
+             : h < kCrownBase                ? SemanticClass::kUndergrowth
+                                             : SemanticClass::kCanopy;
     }
-    if (h > kGroundThickness) {
+    if (h > kGroundThickness && kind != SemanticClass::kPillar) {
       crowns[tree].add(cloud.points[i].z(), canopy.cell_of(p.x(), p.y()), h > kCrownBase);
     }
   }

@@ -89,7 +89,9 @@ int sectors_of(double radius) {
   return std::clamp(static_cast<int>(std::lround(2 * std::numbers::pi * radius / kArc)), 6, 36);
 }
 
-StemEvidence weigh(std::span<const Vec3> points, const Stem& stem) {
+}  // namespace
+
+StemEvidence weigh_stem(std::span<const Vec3> points, const Stem& stem) {
   StemEvidence evidence;
   evidence.stem = stem;
   const int sectors = sectors_of(stem.radius);
@@ -133,8 +135,6 @@ StemEvidence weigh(std::span<const Vec3> points, const Stem& stem) {
   evidence.score = evidence.layers * (0.05 + evidence.seen_fraction) * purity * sharpness;
   return evidence;
 }
-
-}  // namespace
 
 double StemEvidence::confidence() const {
   const double height = std::min(1.0, layers * kLayer / 1.6);
@@ -193,14 +193,22 @@ Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
 
 }  // namespace
 
-std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& about,
+std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& about,
                                      const StemConfig& config) {
   constexpr std::size_t kFollowed = 2;  // of the starts, after the coarse steps
   constexpr double kHopeless = 0.1;     // confidence; bushes have less
-  if (points.size() < kFewestOfStem) return std::nullopt;
+  constexpr double kNoStem = 0.02;      // confidence
+  constexpr std::size_t kEnough = 400;  // points, for the coarse steps
+  if (all.size() < kFewestOfStem) return std::nullopt;
+  // Most places of an orchard are leaves, many of them: a part of them tells so as well.
+  std::vector<Vec3> part;
+  if (const std::size_t stride = 1 + all.size() / kEnough; stride > 1) {
+    for (std::size_t i = 0; i < all.size(); i += stride) part.push_back(all[i]);
+  }
+  const std::span<const Vec3> points = part.empty() ? all : std::span<const Vec3>(part);
   std::vector<StemEvidence> begun;
   const auto begin = [&](const Stem& start) {
-    begun.push_back(weigh(points, improve(points, start, config, kCoarse)));
+    begun.push_back(weigh_stem(points, improve(points, start, config, kCoarse)));
   };
   const auto by_score = [](const StemEvidence& a, const StemEvidence& b) {
     return a.score > b.score;
@@ -214,9 +222,11 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& a
     std::stable_sort(begun.begin(), begun.end(), by_score);
   }
   if (begun.size() > kFollowed) begun.resize(kFollowed);
+  // What is this far from a stem after the coarse steps does not become one by the fine ones.
+  if (begun.front().confidence() < kNoStem) return std::nullopt;
   std::optional<StemEvidence> best;
   for (const StemEvidence& each : begun) {
-    const StemEvidence evidence = weigh(points, improve(points, each.stem, config, kFine));
+    const StemEvidence evidence = weigh_stem(all, improve(all, each.stem, config, kFine));
     if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }

@@ -55,4 +55,7 @@ struct StemEvidence {
 std::optional<StemEvidence> fit_stem(std::span<const Vec3> points, const Vec2& about,
                                      const StemConfig& config);
 
+/// What speaks for a stem in points (x, y, height above the ground).
+StemEvidence weigh_stem(std::span<const Vec3> points, const Stem& stem);
+
 }  // namespace arex

@@ -50,6 +50,68 @@ struct Stand {
   }
 };
 
+/// Two rows of an orchard: stems of a hand's width in leaves from 0.7 m up, posts of a trellis
+/// among them.
+struct OrchardRows {
+  AnalyticForest cloud;
+  std::vector<AnalyticStem> stems;
+  std::vector<Vec2> posts;
+
+  explicit OrchardRows(std::uint64_t seed) : cloud({0.05, 0.02}, seed) {
+    cloud.add_ground(7);
+    for (const double y : {-1.9, 1.9}) {
+      for (int i = 0; i < 9; ++i) {
+        AnalyticStem stem;
+        stem.foot = {1.2 * (i - 4), y + 0.04 * cloud.random().normal()};
+        stem.radius = 0.027 + 0.002 * i;
+        stem.taper = 0.013;
+        stem.lean = 0.03 * Vec2(cloud.random().normal(), cloud.random().normal());
+        stem.height = 3.2;
+        cloud.add_stem(stem);
+        for (int leaf = 0; leaf < 400; ++leaf) {
+          const double h = cloud.random().uniform(0.7, 3.5);
+          const Vec2 off = 0.25 * Vec2(cloud.random().normal(), cloud.random().normal());
+          const Vec2 p = stem.foot + off;
+          cloud.add({p.x(), p.y(), cloud.ground(stem.foot) + h});
+        }
+        stems.push_back(stem);
+      }
+      for (const double x : {-3.0, 0.6, 4.2}) {
+        AnalyticStem post;
+        post.foot = {x, y};
+        post.radius = 0.05;
+        post.taper = 0;
+        post.height = 3.0;
+        cloud.add_stem(post);
+        posts.push_back(post.foot);
+      }
+    }
+  }
+};
+
+TEST(ForestMap, FindsTheThinStemsOfAnOrchardAndTellsPostsFromThem) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const OrchardRows rows(seed);
+    const SemanticMap map = build_semantic_map(rows.cloud.points, {}, {});
+    EXPECT_EQ(map.scene, SceneKind::kForest);
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), rows.stems.size()) << seed;
+    for (const AnalyticStem& stem : rows.stems) {
+      const SemanticObject* found = stem_near(map, stem.at_breast());
+      ASSERT_TRUE(found) << seed << ": " << stem.foot.transpose();
+      EXPECT_LT((found->position.head<2>() - stem.at_breast()).norm(), 0.05);
+      EXPECT_NEAR(found->size.x(), 2 * stem.radius, 0.03);
+    }
+    ASSERT_EQ(map.count(SemanticClass::kPillar), rows.posts.size()) << seed;
+    for (const SemanticObject& object : map.objects) {
+      if (object.kind != SemanticClass::kPillar) continue;
+      const bool there = std::any_of(rows.posts.begin(), rows.posts.end(), [&](const Vec2& post) {
+        return (object.position.head<2>() - post).norm() < 0.05;
+      });
+      EXPECT_TRUE(there) << seed << ": " << object.position.transpose();
+    }
+  }
+}
+
 TEST(ForestMap, FindsEveryStemOnASlopeAndMeasuresIt) {
   for (const double slope : {0.0, 0.3, 0.7}) {
     for (const std::uint64_t seed : {1U, 2U, 3U}) {

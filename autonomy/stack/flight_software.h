@@ -83,6 +83,9 @@ class FlightSoftware {
   virtual std::vector<FeatureSight> take_features() { return {}; }
 
   [[nodiscard]] virtual FlightView view() const = 0;
+  /// The way still to be flown as it is planned now, for pictures of it: a polyline in O from where
+  /// the vehicle should be; empty where none is planned.
+  [[nodiscard]] virtual std::vector<Vec3> planned_path() const { return {}; }
   /// What the view's grid was made from, for pictures of it; nothing where nobody keeps it.
   [[nodiscard]] virtual MappedFrames mapped_frames() const { return {}; }
 

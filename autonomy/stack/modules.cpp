@@ -17,6 +17,13 @@
 namespace arex {
 namespace {
 
+/// The left eye in B: that of the depth camera, unless it has a mount of its own, as in recordings
+/// of other people's vehicles.
+Pose infrared_mount(const VehicleConfig& vehicle) {
+  const bool own = vehicle.mounts.contains("infrared");
+  return own ? vehicle.X_BC("infrared") : vehicle.X_BC();
+}
+
 // Sources and explorers that ship have their parameters under `odometry` and `exploration`. A
 // section of a further source says only what differs from these.
 void register_shipped(Modules& to) {
@@ -33,8 +40,8 @@ void register_shipped(Modules& to) {
                    [](const ConfigNode& section, const ModuleContext& context) {
                      const StackConfig& config = context.config;
                      return std::make_unique<VisualInertialSource>(
-                         read_over(config.odometry.visual_inertial, section), config.vehicle.X_BC(),
-                         context.seed);
+                         read_over(config.odometry.visual_inertial, section),
+                         infrared_mount(config.vehicle), context.seed);
                    }});
   to.odometry.add<NoParameters>("mocap", "the true pose: the oracle, for ablations",
                                 [](const NoParameters&, const ModuleContext& context) {

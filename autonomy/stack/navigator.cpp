@@ -1,5 +1,6 @@
 #include "stack/navigator.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace arex {
@@ -101,6 +102,21 @@ TrajectorySetpoint Navigator::update(const std::shared_ptr<const GridSnapshot>& 
     progress_ = MotionProgress::kFailed;
   }
   return machine_.setpoint(now, force_lag_s_);
+}
+
+std::vector<Vec3> Navigator::planned_path(Stamp now) const {
+  constexpr double kStep_s = 0.1;
+  const UniformBspline& curve = machine_.trajectory();
+  const double duration = curve.duration_s();
+  // Before its motion begins the vehicle turns.
+  const double begin = std::max(0.0, to_seconds(now - machine_.trajectory_start()));
+  std::vector<Vec3> points;
+  if (begin >= duration) return points;
+  for (int i = 0; begin + i * kStep_s < duration; ++i) {
+    points.push_back(curve.position(begin + i * kStep_s));
+  }
+  points.push_back(curve.position(duration));
+  return points;
 }
 
 }  // namespace arex

@@ -42,6 +42,8 @@ class Navigator {
   [[nodiscard]] MotionProgress progress() const { return progress_; }
   [[nodiscard]] std::string_view cause() const { return to_string(machine_.cause()); }
   [[nodiscard]] const PlanCounts& counts() const { return machine_.counts(); }
+  /// What of the trajectory in force is still to be flown, in O; empty where that is over.
+  [[nodiscard]] std::vector<Vec3> planned_path(Stamp now) const;
   std::vector<PlannerEvent> take_events() { return std::exchange(events_, {}); }
 
  private:

@@ -426,6 +426,13 @@ FlightView Stack::view() const {
   return view;
 }
 
+std::vector<Vec3> Stack::planned_path() const {
+  if (navigating_) return navigator_.planned_path(now_);
+  const bool leg =
+      request_.kind == MotionRequest::Kind::kLeg || request_.kind == MotionRequest::Kind::kTakeoff;
+  return leg ? std::vector<Vec3>{setpoint_.p_OB, request_.goal_O} : std::vector<Vec3>{};
+}
+
 void Stack::read_cloud(Stamp due, CloudReader reader) {
   jobs_.schedule(perception_.cloud_lane(), due,
                  [this, reader = std::move(reader)] { return reader(perception_.cloud()); });

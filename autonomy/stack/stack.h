@@ -54,6 +54,7 @@ class Stack : public FlightSoftware {
   std::vector<Decision> take_decisions() override;
   std::vector<FeatureSight> take_features() override;
   [[nodiscard]] FlightView view() const override;
+  [[nodiscard]] std::vector<Vec3> planned_path() const override;
   [[nodiscard]] MappedFrames mapped_frames() const override { return perception_.frames(); }
   void read_cloud(Stamp due, CloudReader reader) override;
   [[nodiscard]] const PointCloudMap& cloud() const override { return perception_.cloud(); }

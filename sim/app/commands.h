@@ -108,15 +108,17 @@ struct ReportArguments {
 int report(const ReportArguments& arguments);
 
 struct ReplayArguments {
-  std::string recording;               ///< a ROS 1 bag or MCAP
-  std::string out;                     ///< run folder to write
-  std::string config;                  ///< a scenario; empty: the defaults
-  std::vector<std::string> overrides;  ///< --set key=value
-  std::string lidar_topic, imu_topic;  ///< empty: told by type
-  std::string truth_topic;             ///< empty: told by type and name
-  std::string truth;                   ///< TUM file; empty: what the recording has
-  std::string imu_unit = "auto";       ///< of accelerations: auto, g or mps2
-  std::string time_unit = "auto";      ///< of points: auto, s, ms, us or ns
+  std::string recording;                    ///< a ROS 1 bag or MCAP
+  std::string out;                          ///< run folder to write
+  std::string config;                       ///< a scenario; empty: the defaults
+  std::vector<std::string> overrides;       ///< --set key=value
+  std::string lidar_topic, imu_topic;       ///< empty: told by type
+  std::string truth_topic;                  ///< empty: told by type and name
+  std::string depth_topic, infrared_topic;  ///< likewise; of the left eye
+  std::string truth;                        ///< TUM file; empty: what the recording has
+  std::vector<std::string> snapshots;       ///< times of the recording, s
+  std::string imu_unit = "auto";            ///< of accelerations: auto, g or mps2
+  std::string time_unit = "auto";           ///< of points: auto, s, ms, us or ns
   int threads = 1;
   bool report = true;  ///< also write report.html
   bool quiet = false;

@@ -217,6 +217,14 @@ void add_replay(CLI::App& app, ReplayArguments& arguments, int& exit_code) {
   command->add_option("--imu-topic", arguments.imu_topic, "default: told by its type");
   command->add_option("--truth-topic", arguments.truth_topic,
                       "default: poses whose topic's name says so");
+  command->add_option("--depth-topic", arguments.depth_topic, "default: told by type and name");
+  command->add_option("--infrared-topic", arguments.infrared_topic,
+                      "of the pair's left eye; default: told by type and name");
+  command
+      ->add_option("--snapshot", arguments.snapshots,
+                   "what it sees after so many seconds of the recording, into snapshots/; may be "
+                   "repeated")
+      ->allow_extra_args(false);
   command->add_option("--truth", arguments.truth, "a trajectory, in place of such a topic");
   command->add_option("--imu-unit", arguments.imu_unit, "of accelerations: auto, g or mps2")
       ->check(CLI::IsMember({"auto", "g", "mps2"}))

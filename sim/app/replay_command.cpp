@@ -12,11 +12,13 @@
 #include "app/commands.h"
 #include "app/host.h"
 #include "app/interrupts.h"
+#include "app/snapshot_option.h"
 #include "config/text.h"
 #include "evaluation/trajectory_file.h"
 #include "report/run_report.h"
 #include "run/replay.h"
 #include "run/run_folder.h"
+#include "run/snapshot.h"
 
 namespace arex::app {
 namespace {
@@ -33,6 +35,8 @@ sim::ReplayOptions options_of(const ReplayArguments& arguments) {
   options.lidar_topic = arguments.lidar_topic;
   options.imu_topic = arguments.imu_topic;
   options.truth_topic = arguments.truth_topic;
+  options.depth_topic = arguments.depth_topic;
+  options.infrared_topic = arguments.infrared_topic;
   if (arguments.imu_unit == "g") options.accel_unit = sim::AccelUnit::kG;
   if (arguments.imu_unit == "mps2") options.accel_unit = sim::AccelUnit::kMps2;
   if (arguments.time_unit == "s") options.time_unit = sim::TimeUnit::kSeconds;
@@ -123,6 +127,9 @@ int replay(const ReplayArguments& arguments) {
   const std::clock_t cpu_begin = std::clock();
   const Interrupts interrupts;
   sim::Scenario scenario = configuration(arguments);
+  constexpr double kLatest_s = 1e6;  // of a clock that a recording is replayed by
+  const std::vector<Stamp> snapshots =
+      snapshot_times(arguments.snapshots, kLatest_s, "ten days of recording");
   sim::ReplayInput input(arguments.recording, options_of(arguments));
   sim::prepare_for_replay(scenario, input);
   std::optional<sim::Trajectory> given;
@@ -133,9 +140,11 @@ int replay(const ReplayArguments& arguments) {
   sim::Recorder recorder(folder.path(), scenario.resolved_yaml());
   sim::Replay replay(scenario, input, arguments.threads);
   replay.record_to(recorder);
+  sim::SnapshotTaker taker(folder.path(), snapshots, scenario.config.stack);
   Progress progress(!arguments.quiet);
   const Stamp from = replay.now();
   while (replay.tick()) {
+    taker.update(replay.now(), replay.software());
     if (Interrupts::signal() != 0 || recorder.failed()) replay.interrupt();
     progress.update(to_seconds(replay.now() - from), to_seconds(input.duration()));
   }
@@ -155,6 +164,7 @@ int replay(const ReplayArguments& arguments) {
   recorder.write_summary(summary);
   if (arguments.report && !result.interrupted) sim::write_run_report(folder.path());
   if (!arguments.quiet) print_result(result, input, folder.path());
+  tell_missed(taker.missed(), "recording", replay.now());
   for (const std::string& failure : recorder.failures()) {
     std::fprintf(stderr, "arex: %s\n", printable(failure).c_str());
   }

@@ -15,6 +15,7 @@
 #include "app/commands.h"
 #include "app/host.h"
 #include "app/interrupts.h"
+#include "app/snapshot_option.h"
 #include "config/text.h"
 #include "files/files.h"
 #include "report/run_report.h"
@@ -97,19 +98,10 @@ void check_outputs(const RunArguments& arguments, const std::filesystem::path& f
 }
 
 /// The times of --snapshot. @throws ConfigError for one that the mission cannot have.
-std::vector<Stamp> snapshot_times(const RunArguments& arguments, const sim::Scenario& scenario) {
-  const double end_s = scenario.config.stack.mission.max_time_s;
-  std::vector<Stamp> times;
-  for (const std::string& text : arguments.snapshots) {
-    const auto time_s = parse_double(text);
-    if (!time_s || !(*time_s > 0 && *time_s <= end_s)) {
-      throw ConfigError("--snapshot: is '" + shortened(text) +
-                        "', expected seconds above 0 and up to mission.max_time_s, " +
-                        config_detail::format_scalar(end_s));
-    }
-    times.push_back(from_seconds(*time_s));
-  }
-  return times;
+std::vector<Stamp> times_of_snapshots(const RunArguments& arguments,
+                                      const sim::Scenario& scenario) {
+  return snapshot_times(arguments.snapshots, scenario.config.stack.mission.max_time_s,
+                        "mission.max_time_s");
 }
 
 sim::BagOptions bag_options(const RunArguments& arguments, const sim::Scenario& scenario) {
@@ -133,7 +125,7 @@ class Outputs {
       bag_.emplace(arguments.bag, scenario.config.stack.vehicle, bag_options(arguments, scenario));
     }
     recorder_.emplace(folder, scenario.resolved_yaml());
-    snapshots_.emplace(folder, snapshot_times(arguments, scenario), scenario.config.stack);
+    snapshots_.emplace(folder, times_of_snapshots(arguments, scenario), scenario.config.stack);
     simulation.record_to(*recorder_);
     if (bag_) simulation.record_to(*bag_);
   }
@@ -169,7 +161,7 @@ void fly(sim::Simulation& simulation, Outputs& outputs, bool quiet) {
   // A flight that is not recorded is not worth flying: it ends where the disk refuses.
   try {
     while (simulation.tick()) {
-      outputs.snapshots().update(simulation);
+      outputs.snapshots().update(simulation.now(), simulation.software());
       if (Interrupts::signal() != 0) simulation.interrupt("signal");
       if (outputs.recorder().failed()) simulation.interrupt(printable(outputs.failures().front()));
       progress.update(simulation);
@@ -231,14 +223,6 @@ bool all_met(const std::vector<sim::Requirement>& requirements,
   return all;
 }
 
-// A flight may end before a snapshot is due.
-void tell_missed(const std::vector<Stamp>& times, Stamp end) {
-  for (const Stamp time : times) {
-    std::fprintf(stderr, "arex: no snapshot at %s s, for the flight ended at %.3f s\n",
-                 sim::snapshot_name(time).c_str(), to_seconds(end));
-  }
-}
-
 /// One line of what went wrong, which no report and no result line replaces.
 void complain(const sim::FlightResult& result, const std::vector<std::string>& failures,
               bool quiet) {
@@ -265,7 +249,7 @@ int run(const RunArguments& arguments) {
                          arguments.scenario.seed);
   scenario.name = printable(arguments.name.empty() ? scenario.name : arguments.name);
   const std::vector<sim::Requirement> requirements = parse_requirements(arguments);
-  static_cast<void>(snapshot_times(arguments, scenario));
+  static_cast<void>(times_of_snapshots(arguments, scenario));
   const std::unique_ptr<sim::RunFolder> folder = claim_folder(arguments, scenario);
   check_outputs(arguments, folder->path());
 
@@ -292,7 +276,7 @@ int run(const RunArguments& arguments) {
     outputs.attempt(
         [&] { print_result(result, report ? folder->path() / "report.html" : folder->path()); });
   }
-  tell_missed(outputs.snapshots().missed(), result.duration);
+  tell_missed(outputs.snapshots().missed(), "flight", result.duration);
   complain(result, outputs.failures(), arguments.quiet);
   const bool met = all_met(requirements, summary);
   if (Interrupts::signal() != 0) return 128 + SIGINT;

@@ -45,6 +45,9 @@ class CompanionLink : public FlightSoftware {
   std::vector<FeatureSight> take_features() override { return software_->take_features(); }
   [[nodiscard]] MappedFrames mapped_frames() const override { return software_->mapped_frames(); }
   [[nodiscard]] FlightView view() const override { return software_->view(); }
+  [[nodiscard]] std::vector<Vec3> planned_path() const override {
+    return software_->planned_path();
+  }
   void read_cloud(Stamp due, CloudReader reader) override {
     software_->read_cloud(due, std::move(reader));
   }

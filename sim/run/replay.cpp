@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "config/text.h"
 #include "messages/odometry_need.h"
 #include "semantics/semantic_map.h"
 #include "stack/stack.h"
@@ -42,19 +41,6 @@ bool concerns_replay(const Event& event) {
     default:
       return false;
   }
-}
-
-bool says_mount(const ConfigNode& source) {
-  const ConfigNode* vehicle = source.find("vehicle");
-  if (vehicle == nullptr) return false;
-  return vehicle->find("lidar_position_m") || vehicle->find("lidar_pitch_rad") ||
-         vehicle->find("lidar_rotation_rad");
-}
-
-bool is_near(const Pose& a, const Pose& b) {
-  constexpr double kRounding = 1e-9;
-  return (a.R - b.R).cwiseAbs().maxCoeff() < kRounding &&
-         (a.p - b.p).cwiseAbs().maxCoeff() < kRounding;
 }
 
 double length_of(const std::vector<PosePair>& pairs) {
@@ -142,9 +128,15 @@ bool Replay::tick() {
   return true;
 }
 
-// As in a flight: what a tick brings of the IMU, then what jobs have ready, then scans.
+// As in a flight: what a tick brings of the IMU, then what jobs have ready, then scans. Shutters
+// open between two ticks: what a camera saw comes before what jobs have ready on the tick.
 void Replay::deliver() {
   while (coming_ && coming_->time <= now_) {
+    if (coming_->depth || coming_->images) jobs_.advance(now_ - 1);
+    const bool maps_it =
+        coming_->depth && stack_->accepts_depth(coming_->depth->device, coming_->depth->stamp);
+    if (maps_it) stack_->add_depth(coming_->depth);
+    if (coming_->images) stack_->add_images(coming_->images);
     if (coming_->imu) {
       imu_stamp_ = coming_->imu->stamp;
       stack_->add_imu(*coming_->imu);
@@ -258,34 +250,6 @@ ReplayResult Replay::finish(const std::vector<StampedPose>& truth) {
   return result;
 }
 
-void prepare_for_replay(Scenario& scenario, const ReplayInput& input) {
-  StackConfig& stack = scenario.config.stack;
-  const auto further = stack.odometries.find(stack.odometry.source);
-  const std::string& flies =
-      further == stack.odometries.end() ? stack.odometry.source : further->second.type;
-  // Images are not read from recordings: one that runs beside stays silent.
-  if (stack.uses_odometry("mocap") || flies == kVisualInertial) {
-    throw ConfigError("arex replay: the configuration asks for the odometry " +
-                      std::string(flies == kVisualInertial ? kVisualInertial : "mocap") +
-                      ", expected those that a recording feeds, such as odometry.source: "
-                      "lidar_inertial");
-  }
-  if (says_mount(scenario.source)) return;
-  if (!input.X_BL()) {
-    throw ConfigError("arex replay: nothing says where the LiDAR (frame '" +
-                      printable(shortened(input.lidar_frame())) + "') sits on the IMU (frame '" +
-                      printable(shortened(input.imu_frame())) +
-                      "'), expected /tf_static in the recording, or vehicle.lidar_position_m and "
-                      "vehicle.lidar_rotation_rad by --config or --set");
-  }
-  VehicleConfig& vehicle = stack.vehicle;
-  // What is our own vehicle's stays so to the last bit.
-  if (is_near(*input.X_BL(), vehicle.X_BL())) return;
-  vehicle.lidar_position_m = input.X_BL()->p;
-  vehicle.lidar_rotation_rad = so3::Log(input.X_BL()->R);
-  vehicle.lidar_pitch_rad = 0;
-}
-
 nlohmann::ordered_json summarise_replay(const Scenario& scenario, const ReplayResult& result,
                                         const ReplayInput& input, const std::string& recording,
                                         const HostTime& host) {
@@ -314,9 +278,16 @@ nlohmann::ordered_json summarise_replay(const Scenario& scenario, const ReplayRe
                     {"time_origin_s", input.time_origin() / kNanosecondsPerSecond},
                     {"imu", json_of(input.imu_counts(), input.imu_topic())},
                     {"lidar", json_of(input.lidar_counts(), input.lidar_topic())},
+                    {"lidar_misses", input.lidar_misses()},
                     {"truth_topic", input.truth_topic()},
                     {"damaged_places", input.damage().places},
                     {"notes", input.notes()}};
+  if (!input.depth_topic().empty()) {
+    json["replay"]["depth"] = json_of(input.depth_counts(), input.depth_topic());
+  }
+  if (!input.infrared_topic().empty()) {
+    json["replay"]["infrared"] = json_of(input.infrared_counts(), input.infrared_topic());
+  }
   return json;
 }
 

@@ -52,6 +52,7 @@ class Replay {
   /// One millisecond. @return whether there is more.
   bool tick();
   [[nodiscard]] Stamp now() const { return now_; }
+  [[nodiscard]] const FlightSoftware& software() const { return *stack_; }
   void interrupt() { interrupted_ = true; }
 
   /// Scores what was estimated. Call it once, at the end.
@@ -91,9 +92,13 @@ class Replay {
   std::unique_ptr<FlightSoftware> stack_;
 };
 
-/// Gives a scenario the mount that the recording knows, unless the scenario says one itself.
-/// @throws ConfigError if neither does, and for odometries that no recording feeds.
-void prepare_for_replay(Scenario& scenario, const ReplayInput& input);
+/// Gives a scenario the mounts that the recording knows, unless the scenario says them itself, and
+/// has the input read the cameras that the scenario uses: the depth camera for the maps, the
+/// infrared pair for a visual odometry. Of cameras that sit otherwise than our vehicle's the mounts
+/// stand under vehicle.mounts.depth and vehicle.mounts.infrared.
+/// @throws ConfigError if neither says where the LiDAR is, and for an odometry that this recording
+///   does not feed, if it is to fly.
+void prepare_for_replay(Scenario& scenario, ReplayInput& input);
 
 /// summary.json of a replay: the figures that it has, and of the recording under `replay`.
 nlohmann::ordered_json summarise_replay(const Scenario& scenario, const ReplayResult& result,

@@ -136,9 +136,14 @@ void Simulation::record_to(Recorder& recorder) {
   };
 }
 
+void Simulation::record_to(BagWriter& bag) {
+  outlets_.bags.push_back(&bag);
+  displays_.emplace_back(bag, *stack_, physics_.airframe());
+}
+
 bool Simulation::tick() {
   stack_->begin(now_);
-  if (outlets_.bag) outlets_.bag->begin(now_);
+  for (BagWriter* bag : outlets_.bags) bag->begin(now_);
   fire_devices();
   run_stack();
   run_autopilot();
@@ -222,15 +227,16 @@ void Simulation::record() {
     fault_log_.add(event);
     operator_.report(event);
     if (recorder_) recorder_->event(event);
+    for (FlightDisplay& display : displays_) display.event(event);
   }
   if (now_ % FlightScorer::kPeriod == 0) {
     const FlightSample sample =
         scorer_.sample(truth, view, !autopilot_.landed(), physics_.battery());
     if (recorder_) recorder_->sample(now_, sample);
-    if (outlets_.bag) {
-      if (sample.estimate_X_OB) outlets_.bag->estimate(now_, *sample.estimate_X_OB);
-      outlets_.bag->place_odom(scorer_.X_WO(), scorer_.has_begun());
-      outlets_.bag->truth(now_, truth.X_WB, truth.v_WB, truth.w_WB_B);
+    for (BagWriter* bag : outlets_.bags) {
+      if (sample.estimate_X_OB) bag->estimate(now_, *sample.estimate_X_OB);
+      bag->place_odom(scorer_.X_WO(), scorer_.has_begun());
+      bag->truth(now_, truth.X_WB, truth.v_WB, truth.w_WB_B);
     }
   }
   const std::vector<FeatureSight> features = stack_->take_features();
@@ -238,7 +244,9 @@ void Simulation::record() {
   for (const Decision& decision : stack_->take_decisions()) {
     exploration_.add(decision);
     if (recorder_) recorder_->decision(decision);
+    for (FlightDisplay& display : displays_) display.decision(decision);
   }
+  for (FlightDisplay& display : displays_) display.update(now_);
   if (coverage_ && now_ % kPathPeriod == 0) path_W_.push_back(truth.X_WB.p);
   if (coverage_ && now_ % kCoveragePeriod == 0) score_coverage();
   if (recorder_ && now_ % kFlushPeriod == 0) recorder_->flush();
@@ -286,6 +294,9 @@ void Simulation::check_end() {
     const std::string what =
         fmt::format("{} {} at {:.2f} m/s", name, hit->object, hit->impact_speed_mps);
     if (recorder_) recorder_->event({now_, EventKind::kCollision, what});
+    for (FlightDisplay& display : displays_) {
+      display.event({now_, EventKind::kCollision, what});
+    }
     end(Outcome::kCollided, "hit " + what);
   } else if (const FlightView view = stack_->view(); view.state == MissionState::kDone) {
     if (view.lost) {

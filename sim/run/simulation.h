@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "physics/physics.h"
 #include "run/dshot.h"
 #include "run/fault_log.h"
+#include "run/flight_display.h"
 #include "run/recorder.h"
 #include "run/scenario.h"
 #include "run/stage_timer.h"
@@ -89,8 +91,9 @@ class Simulation {
   /// Writes what happens from now on; `recorder` must outlive the flight.
   void record_to(Recorder& recorder);
 
-  /// Gives what the sensors deliver to a bag as well; it must outlive the flight.
-  void record_to(BagWriter& bag) { outlets_.bag = &bag; }
+  /// Gives what the sensors deliver to a bag as well, and what the flight software makes of it; to
+  /// one more with each call. It must outlive the flight.
+  void record_to(BagWriter& bag);
 
   /// Flies one millisecond. @return whether the flight goes on.
   bool tick();
@@ -101,6 +104,7 @@ class Simulation {
   [[nodiscard]] double area_fraction() const { return area_fraction_; }
   [[nodiscard]] Stamp now() const { return now_; }
   [[nodiscard]] const Truth& truth() const { return physics_.truth(); }
+  [[nodiscard]] const FlightSoftware& software() const { return *stack_; }
   [[nodiscard]] FlightView view() const { return stack_->view(); }
   [[nodiscard]] MappedFrames mapped_frames() const { return stack_->mapped_frames(); }
   // Of what was flown so far.
@@ -162,6 +166,7 @@ class Simulation {
   Outlets outlets_;
   std::vector<std::pair<std::string, std::unique_ptr<Device>>> devices_;  ///< fired in this order
   std::unique_ptr<FlightSoftware> stack_;
+  std::deque<FlightDisplay> displays_;  ///< one of each bag; jobs know where they are
   OperatorLink operator_;
   bool drive_faulty_;  ///< motors, speed controllers or battery, at some time
 };

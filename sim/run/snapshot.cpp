@@ -11,7 +11,6 @@
 #include "files/files.h"
 #include "mapping/cloud_io.h"
 #include "mapping/state_tree.h"
-#include "run/simulation.h"
 #include "run/snapshot_picture.h"
 #include "run/summary.h"
 
@@ -211,13 +210,13 @@ SnapshotTaker::SnapshotTaker(const fs::path& run_folder, std::vector<Stamp> time
   times_.erase(std::unique(times_.begin(), times_.end()), times_.end());
 }
 
-void SnapshotTaker::update(const Simulation& simulation) {
-  if (times_.empty() || simulation.now() < times_.front()) return;
+void SnapshotTaker::update(Stamp now, const FlightSoftware& software) {
+  if (times_.empty() || now < times_.front()) return;
   const Stamp stamp = times_.front();
   times_.erase(times_.begin());
-  const FlightView view = simulation.view();
+  const FlightView view = software.view();
   const Snapshot snapshot =
-      take_snapshot(stamp, view.odometry, view.grid.get(), simulation.mapped_frames(), config_);
+      take_snapshot(stamp, view.odometry, view.grid.get(), software.mapped_frames(), config_);
   write_snapshot(folder_ / snapshot_name(stamp), snapshot, view.grid.get(),
                  config_.mapping.local.sensor);
 }

@@ -10,13 +10,12 @@
 #include "mapping/local_grid.h"
 #include "messages/estimates.h"
 #include "messages/registered_scan.h"
+#include "stack/flight_software.h"
 #include "stack/stack_config.h"
 
 /// What the vehicle saw at one moment: the newest frame, all frames that its local grid held, and
 /// that grid as the planner flew in it. A folder of a run, snapshots/TIME/.
 namespace arex::sim {
-
-class Simulation;
 
 /// All files of a snapshot; the last one is written last: a folder without it is unfinished.
 inline constexpr std::array<std::string_view, 8> kSnapshotFiles{
@@ -56,7 +55,7 @@ class SnapshotTaker {
                 const StackConfig& config);
 
   /// After each tick. @throws DiskError.
-  void update(const Simulation& simulation);
+  void update(Stamp now, const FlightSoftware& software);
   /// The times that the flight has not reached.
   [[nodiscard]] const std::vector<Stamp>& missed() const { return times_; }
 

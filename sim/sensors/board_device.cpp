@@ -21,7 +21,7 @@ void BoardDevice::fire(const Moment& moment) {
   output_line_.pass(now, imu_.output(), [&](const ImuSample& sample) {
     outlets_.software->add_imu(sample);
     add(sample);
-    if (outlets_.bag) outlets_.bag->imu(sample);
+    for (BagWriter* bag : outlets_.bags) bag->imu(sample);
   });
   field_line_.pass(now, imu_.magnetometer(), [&](const MagnetometerSample& sample) {
     autopilot_.add_magnetometer(sample);

@@ -60,7 +60,7 @@ void DepthDevice::hand_on(const DepthImagePtr& frame, std::uint64_t hash) {
   note(hash);
   outlets_.frames.add(hash);
   outlets_.software->add_depth(frame);
-  if (outlets_.bag) outlets_.bag->depth(*frame);
+  for (BagWriter* bag : outlets_.bags) bag->depth(*frame);
 }
 
 }  // namespace arex::sim

@@ -29,8 +29,8 @@ struct Moment {
 /// Where readings go to. Constant while a flight goes on.
 struct Outlets {
   FlightSoftware* software = nullptr;
-  BagWriter* bag = nullptr;  ///< null: they are not recorded
-  Fingerprint frames;        ///< of every scan and image, in order of delivery
+  std::vector<BagWriter*> bags;  ///< where they are recorded
+  Fingerprint frames;            ///< of every scan and image, in order of delivery
   /// Told of every infrared frame delivered, its true stamp and mean grey value; may be empty.
   std::function<void(Stamp stamp, const StereoImage& images, double mean_grey)> on_images;
 };

@@ -88,7 +88,7 @@ void InfraredDevice::hand_on(const StereoImagePtr& image, std::uint64_t hash) {
   note(hash);
   outlets_.frames.add(hash);
   outlets_.software->add_images(image);
-  if (outlets_.bag) outlets_.bag->infrared(*image);
+  for (BagWriter* bag : outlets_.bags) bag->infrared(*image);
 }
 
 }  // namespace arex::sim

@@ -104,7 +104,7 @@ void LidarDevice::hand_on(const LidarScanPtr& scan, std::uint64_t hash) {
   misses_ += scan->misses();
   outlets_.frames.add(hash);
   outlets_.software->add_scan(scan);
-  if (outlets_.bag) outlets_.bag->scan(*scan);
+  for (BagWriter* bag : outlets_.bags) bag->scan(*scan);
 }
 
 }  // namespace arex::sim

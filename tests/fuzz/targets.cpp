@@ -5,10 +5,9 @@
 #include <stdexcept>
 
 #include "autonomy/semantics/cloud_bytes.h"
-#include "bag/bag_writer.h"
-#include "bag/replay_input.h"
 #include "config/config.h"
 #include "evaluation/comparison.h"
+#include "fuzz/bag_corpus.h"
 #include "fuzz/corpus.h"
 #include "fuzz/mutation.h"
 #include "report/comparison_report.h"
@@ -163,60 +162,6 @@ void read_cloud(const fs::path& folder, RandomStream& random) {
   const CloudFile cloud = read_cloud_file(folder / "cloud");
   const SemanticMap map = build_semantic_map(cloud.points, {}, {});
   if (map.labels.size() != cloud.points.size()) throw std::runtime_error("labels got lost");
-}
-
-// A third of a second as a recording, in each container and layout; small, so that damage meets
-// more than points.
-const std::vector<std::string>& recorded_bags() {
-  static const std::vector<std::string> bags = [] {
-    const TemporaryFolder folder;
-    std::vector<std::string> all;
-    for (const sim::BagLayout layout :
-         {sim::BagLayout::kGeneric, sim::BagLayout::kLivoxDriver2, sim::BagLayout::kLivoxCustom}) {
-      for (const char* name : {"plain.bag", "packed.bag", "plain.mcap", "packed.mcap"}) {
-        const bool packed = std::string_view(name).starts_with("packed");
-        sim::BagWriter bag(
-            folder / name, VehicleConfig{},
-            {layout, packed ? sim::BagCompression::kLz4 : sim::BagCompression::kNone, false});
-        bag.place_odom(Pose(), true);
-        for (int i = 0; i < 60; ++i) {
-          const Stamp now = (i + 1) * 5 * kNanosecondsPerTick;
-          bag.begin(now);
-          bag.imu({now, {0.1, 0, 0}, {0, 0, kGravity}, {0, 0, 0}});
-          bag.truth(now, Pose(), Vec3::Zero(), Vec3::Zero());
-          if (i % 20 != 0) continue;
-          LidarScan scan{"", now, now + 1, {}};
-          for (std::uint32_t k = 0; k < 12; ++k) {
-            scan.points.push_back({Vec3f(1, 2, static_cast<float>(k)), 7, 5000 * k, 1, 0, 0});
-          }
-          bag.scan(scan);
-        }
-        bag.close();
-        all.push_back(read_text(folder / name));
-      }
-    }
-    return all;
-  }();
-  return bags;
-}
-
-// What `arex replay` does before and while it replays, but for the odometry.
-void read_recording(const fs::path& folder, RandomStream& random) {
-  const std::vector<std::string>& sound = recorded_bags();
-  const auto last = static_cast<int>(sound.size()) - 1;
-  const std::string& bytes = sound[static_cast<std::size_t>(random.uniform_int(0, last))];
-  write_text(folder / "a.bag", damage_bytes(bytes, sound, random));
-  sim::ReplayInput input(folder / "a.bag", {});
-  Stamp before = -kForever;
-  while (const auto arrival = input.next()) {
-    if (arrival->time < before) throw std::runtime_error("time runs backwards");
-    before = arrival->time;
-    if (arrival->scan && arrival->scan->end <= arrival->scan->stamp) {
-      throw std::runtime_error("a frame that ends before it begins");
-    }
-  }
-  static_cast<void>(input.read_truth());
-  static_cast<void>(input.notes());
 }
 
 }  // namespace

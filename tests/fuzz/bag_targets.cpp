@@ -1,0 +1,8 @@
+#include "fuzz/bag_corpus.h"
+#include "fuzz/targets.h"
+
+namespace arex::test {
+
+std::vector<Target> all_targets() { return {{"recording", read_recording}}; }
+
+}  // namespace arex::test

@@ -215,8 +215,9 @@ struct Scene::Embree {
   void attach(std::size_t vertex_count) {
     scene = rtcNewScene(device);
     // Robust: a box or a triangle that a ray grazes is searched, not missed.
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const bool large = facets.triangles.size() > kLarge;
+    rtcSetSceneFlags(
+        scene, large ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
     const RTCBuildQuality quality = large ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
     rtcSetSceneBuildQuality(scene, quality);
     if (facets.triangles.empty()) return;

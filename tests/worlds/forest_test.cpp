@@ -339,9 +339,7 @@ TEST(Forest, FarTreesAreCoarse) {
       const Vec3 p = of.mesh.vertices[a].cast<double>(), q = of.mesh.vertices[b].cast<double>(),
                  r = of.mesh.vertices[c].cast<double>();
       const Vec2 middle = ((p + q + r) / 3).head<2>();
-      const double inside = (middle - detailed.min())
-                                .cwiseMin(detailed.max() - middle)
-                                .minCoeff();
+      const double inside = (middle - detailed.min()).cwiseMin(detailed.max() - middle).minCoeff();
       count.near += inside > kCrown;
       if (inside > -kCrown) continue;
       ++count.far;

@@ -44,8 +44,9 @@ TEST_F(FileErrors, WhatWasLeftOutIsSaidWhereNothingIsLeft) {
     return "<sdf version='1.6'><world name='w'>" + body + "</world></sdf>";
   };
   const auto shape = [&](const std::string& geometry) {
-    return world_with("<model name='m'><static>1</static><link name='l'><visual name='v'><geometry>" +
-                      geometry + "</geometry></visual></link></model>");
+    return world_with(
+        "<model name='m'><static>1</static><link name='l'><visual name='v'><geometry>" + geometry +
+        "</geometry></visual></link></model>");
   };
   expect(said("a.world", world_with("<include><uri>model://barn</uri></include>")),
          "no points; 1 files not found and left out (model://barn); see world.file.model_paths");

@@ -234,6 +234,33 @@ TEST(Scene, BatchAgreesWithSingleCasts) {
   }
 }
 
+// A world of millions of triangles is held otherwise, for the memory's sake; what is out of reach
+// here makes a small one large.
+TEST(Scene, ALargeWorldAnswersTheSame) {
+  const worlds::World world = soup(4, 2000);
+  worlds::World large = world;
+  const auto far = static_cast<std::uint32_t>(large.mesh.vertices.size());
+  for (const Vec3f& p : {Vec3f(0, 0, -500), Vec3f(1, 0, -500), Vec3f(0, 1, -500)}) {
+    large.mesh.vertices.push_back(p);
+  }
+  large.mesh.triangles.resize(2'000'001, {far, far + 1, far + 2});
+  large.mesh.object_of_triangle.resize(large.mesh.triangles.size(), 0);
+  const Scene scene(world), large_scene(large);
+  RandomStream stream(4, "large");
+  int met = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 o = 3 * stream.normal3(), d = stream.normal3().normalized();
+    const Hit hit = scene.cast(o, d, 50), same = large_scene.cast(o, d, 50);
+    ASSERT_EQ(same.triangle, hit.triangle);
+    ASSERT_EQ(same.distance_m, hit.distance_m);
+    ASSERT_EQ(same.normal_W, hit.normal_W);
+    ASSERT_EQ(same.object, hit.object);
+    met += hit.valid();
+    ASSERT_EQ(large_scene.distance_to_surface(o, 5), scene.distance_to_surface(o, 5));
+  }
+  EXPECT_GT(met, 1000);
+}
+
 TEST(Scene, BatchSearchesOnlyTheGivenStretch) {
   test::WorldMaker maker;
   maker.object(0.2F).quad({2, -5, -5}, {0, 10, 0}, {0, 0, 10});

@@ -24,6 +24,9 @@ constexpr int kGuessedPerLayer = 4;
 constexpr int kMostGuessedLayers = FloorSheet::kMostTolerance - kTolerance;
 /// Planes that differ by less at a tile's corners say the same: the 2D map is not made anew.
 constexpr double kSame = 1.0;
+/// A floor that was seen stays where it meets its neighbour's at their common edge, though rays
+/// that graze it wear it off the map. Beside the tolerance: what both planes err there.
+constexpr double kMeet = 1.0;
 /// Neighbours whose floors are further apart than this do not meet; half a band, that what is free
 /// over one is free over the other.
 constexpr double kBrink = 10;
@@ -302,6 +305,15 @@ FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& st
   for (int tolerance = kTolerance; tolerance <= most; ++tolerance) {  // the nearest one first
     if (const auto floor = find_floor(tiles_[tile].feet, expected, tolerance)) {
       label.plane = *floor;
+      label.seen = true;
+      return label;
+    }
+  }
+  if (const Label& before = tiles_[tile].shown; before.known && before.seen) {
+    const Vec2 edge = Vec2::Constant(TilePlane::kMiddle) - 0.5 * kBrickCells * step.cast<double>();
+    const double apart = before.plane.at(edge.x(), edge.y()) - expected.at(edge.x(), edge.y());
+    if (std::abs(apart) <= most + kMeet) {
+      label.plane = before.plane;
       label.seen = true;
       return label;
     }

@@ -206,6 +206,34 @@ TEST(FloorSheet, KnowsTheSlopeOfARampOfWhichLittleIsSeen) {
   }
 }
 
+// Rays that graze a ramp wear it off the map again: it stays where it was seen, and beyond, where
+// it never was, goes on from there.
+TEST(FloorSheet, KeepsAFloorThatIsWornOffTheMap) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    const auto wear_off = [&](int from, int to) {
+      for (int x = from; x < to; ++x) {
+        for (int y = 56; y < 104; ++y) site.at(x, y).clear();
+      }
+      site.give_to(sheet);
+    };
+    wear_off(112, 168);  // its end was never seen
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    wear_off(32, 112);
+    sheet.spread();
+    for (int x = 4; x < 19; ++x) {
+      for (int y = 8; y < 12; ++y) {
+        EXPECT_EQ(sheet.is_seen(tile(x, y)), x < 14) << x << " " << y;
+        EXPECT_NEAR(height(sheet, x, y), -slope * (8 * x + 4 - 24), 6) << x << " " << y;
+      }
+    }
+    EXPECT_NEAR(height(sheet, 23, 10), -80, 1);
+  }
+}
+
 // From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
 TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
   FloorSheet sheet = make_sheet();

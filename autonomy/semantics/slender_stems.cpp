@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <optional>
 
 #include "semantics/layer_raster.h"
@@ -216,8 +217,9 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
   return shaft;
 }
 
-constexpr double kShaftLow = 0.3,
-                 kShaftHigh = 2.9;  // m above the ground, where posts are looked at
+// m above the ground: where posts are looked at, what they end below, and how far above that a tree
+// would show.
+constexpr double kShaftLow = 0.3, kShaftHigh = 2.9, kPostTop = 3.1, kAbove = 0.7;
 constexpr ShaftPrior kPostPrior{
     .radius = 0.05, .radius_sigma = 0.015, .taper = 0, .taper_sigma = 0.02};
 
@@ -307,12 +309,17 @@ std::vector<StemEvidence> find_slender_stems(const WorkingCloud& cloud, const Co
 
 void add_slender_stems(const std::vector<StemEvidence>& slender, std::vector<StemEvidence>& stems) {
   constexpr double kMuchThicker = 1.4;
+  constexpr double kOnBark = 0.06;  // m from the cone's surface
+  constexpr double kWide = 0.2;     // m of girth: more than a slender stem shows
   for (const StemEvidence& line : slender) {
     bool known = false;
     std::erase_if(stems, [&](const StemEvidence& cone) {
       const double apart = (cone.stem.centre - line.stem.centre).norm();
       if (apart > std::max(kSameStem, cone.stem.radius + kCore)) return false;
-      const bool through_leaves = cone.stem.radius > kMuchThicker * line.stem.radius;
+      const double seen_girth = cone.seen_fraction * 2 * std::numbers::pi * cone.stem.radius;
+      const bool strip_of_bark = std::abs(apart - cone.stem.radius) < kOnBark && seen_girth > kWide;
+      const bool through_leaves =
+          cone.stem.radius > kMuchThicker * line.stem.radius && !strip_of_bark;
       known |= !through_leaves;
       return through_leaves;
     });

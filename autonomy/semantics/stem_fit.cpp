@@ -191,21 +191,26 @@ Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
   return stem;
 }
 
+/// Every n-th point, at most `most` of them.
+std::vector<Vec3> thinned(std::span<const Vec3> points, std::size_t most) {
+  const std::size_t stride = (points.size() + most - 1) / most;
+  std::vector<Vec3> part;
+  for (std::size_t i = 0; i < points.size(); i += stride) part.push_back(points[i]);
+  return part;
+}
+
 }  // namespace
 
 std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& about,
                                      const StemConfig& config) {
-  constexpr std::size_t kFollowed = 2;  // of the starts, after the coarse steps
-  constexpr double kHopeless = 0.1;     // confidence; bushes have less
-  constexpr double kNoStem = 0.02;      // confidence
-  constexpr std::size_t kEnough = 400;  // points, for the coarse steps
+  constexpr std::size_t kFollowed = 2;                     // of the starts, after the coarse steps
+  constexpr double kHopeless = 0.1;                        // confidence; bushes have less
+  constexpr double kNoStem = 0.05;                         // confidence
+  constexpr std::size_t kEnough = 200, kEnoughFine = 500;  // points, for coarse and fine steps
   if (all.size() < kFewestOfStem) return std::nullopt;
   // Most places of an orchard are leaves, many of them: a part of them tells so as well.
-  std::vector<Vec3> part;
-  if (const std::size_t stride = 1 + all.size() / kEnough; stride > 1) {
-    for (std::size_t i = 0; i < all.size(); i += stride) part.push_back(all[i]);
-  }
-  const std::span<const Vec3> points = part.empty() ? all : std::span<const Vec3>(part);
+  const std::vector<Vec3> few = thinned(all, kEnough), more = thinned(all, kEnoughFine);
+  const std::span<const Vec3> points = few;
   std::vector<StemEvidence> begun;
   const auto begin = [&](const Stem& start) {
     begun.push_back(weigh_stem(points, improve(points, start, config, kCoarse)));
@@ -226,7 +231,7 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& abou
   if (begun.front().confidence() < kNoStem) return std::nullopt;
   std::optional<StemEvidence> best;
   for (const StemEvidence& each : begun) {
-    const StemEvidence evidence = weigh_stem(all, improve(all, each.stem, config, kFine));
+    const StemEvidence evidence = weigh_stem(all, improve(more, each.stem, config, kFine));
     if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }

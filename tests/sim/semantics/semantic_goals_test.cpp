@@ -85,26 +85,6 @@ TEST(SemanticGoals, StemsOfLowTreesWithLowCrowns) {
   expect_stems(orchard, 121, 122);
 }
 
-/// A part of the orchard of orchard.yaml. Posts of its trellis are pillars.
-TEST(SemanticGoals, StemsAndPostsOfTheOrchard) {
-  worlds::WorldConfig config;
-  config.kind = worlds::WorldKind::kOrchard;
-  config.orchard.size_m = {30, 26};
-  support::MappedCloudOptions options;
-  options.low_m = {-14, -12};
-  options.high_m = {14, 12};
-  options.spacing_m = 1.2;
-  for (const std::uint64_t seed : {131U, 132U}) {
-    const SemanticScore score = score_of(config, options, seed, SceneKind::kForest);
-    const ClassScore& trunk = score.of(SemanticClass::kTrunk);
-    EXPECT_GE(trunk.f1, 0.95) << seed << ": precision " << trunk.precision << ", recall "
-                              << trunk.recall;
-    EXPECT_LE(trunk.position_median_m, 0.05) << seed;
-    EXPECT_LE(trunk.size_median_m, 0.02) << seed;
-    EXPECT_GE(trunk.mapped, 80u) << seed;
-  }
-}
-
 TEST(SemanticGoals, PillarsAndCarsOfTheGarage) {
   worlds::WorldConfig config;
   config.kind = worlds::WorldKind::kGarage;

@@ -59,8 +59,8 @@ std::vector<Vec3> points_near(const WorkingCloud& cloud, const ColumnIndex& inde
 /// The place near `about` with most points of the foot around it.
 std::optional<Vec2> foot_of(const std::vector<Vec3>& points, Vec2 about) {
   constexpr double kReach = 0.15, kTop = 0.8;  // m
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
+  constexpr int kShifts = 4;
+  for (int shift = 0; shift < kShifts; ++shift) {
     Vec2 sum = Vec2::Zero();
     int count = 0;
     for (const Vec3& p : points) {
@@ -179,8 +179,6 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
   constexpr std::array kScales{0.04, 0.04, 0.04, 0.035, 0.03, 0.03, 0.025, 0.025, 0.025, 0.025};
   constexpr double kLargest = 0.3;  // m, radius
   constexpr double kPlace = 0.05;   // m, deviation of the start
-  using Vec6 = Eigen::Matrix<double, 6, 1>;
-  using Mat6 = Eigen::Matrix<double, 6, 6>;
   const Vec2 start = shaft.centre, lean = shaft.lean;
   Vec6 weights;
   weights << kPlace, kPlace, prior.lean_sigma, prior.lean_sigma, prior.radius_sigma,

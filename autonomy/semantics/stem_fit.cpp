@@ -18,9 +18,6 @@ constexpr double kAround = 0.2;           // m above the surface
 constexpr double kWhole = 0.6;            // share of a stem's layers that a seen sector has
 constexpr std::size_t kFewestOfStem = 8;  // points of a stem
 
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-
 /// Circle through points by moments. Source: Kasa, A circle fitting procedure and its error
 /// analysis, IEEE Trans. Instrumentation and Measurement 25, 1976.
 std::optional<Stem> circle_by_moments(std::span<const Vec3> points, const Vec2& about,

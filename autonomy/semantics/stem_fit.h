@@ -9,6 +9,9 @@
 
 namespace arex {
 
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
 inline constexpr double kBreastHeight = 1.3;  ///< forestry's convention, m above the ground
 
 /// A stem near breast height: a cone that may lean.

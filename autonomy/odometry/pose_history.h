@@ -18,6 +18,8 @@ class PoseHistory {
   [[nodiscard]] bool empty() const { return poses_.empty(); }
   /// @pre not empty
   [[nodiscard]] Stamp begin() const { return poses_.front().stamp; }
+  /// @pre not empty
+  [[nodiscard]] Stamp end() const { return poses_.back().stamp; }
   /// X_OB, interpolated; before the first and after the last it stands still. @pre not empty
   [[nodiscard]] Pose at(Stamp stamp) const;
 

@@ -4,7 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "math/so3.h"
 #include "messages/estimates.h"
+#include "odometry/pose_history.h"
 
 namespace arex {
 
@@ -21,7 +23,7 @@ struct FailoverConfig {
       "position errs by 1 cm until then");
     f("back_after_s", back_after_s, "an earlier source is ok for so long before it flies again");
     f("slew_mps", slew_mps, "what two sources differ by comes in at this speed");
-    f("slew_radps", slew_radps, "the same of the heading");
+    f("slew_radps", slew_radps, "the same of the attitude");
     f.check(silent_after_s > 0 && back_after_s >= 0, "silent_after_s > 0, back_after_s >= 0");
     f.check(slew_mps > 0 && slew_mps <= 10 && slew_radps > 0 && slew_radps <= 10,
             "0 < slew_mps, slew_radps <= 10");
@@ -57,22 +59,28 @@ class OdometrySwitch {
     double yaw_rad = 0;
     Vec3 shift_m = Vec3::Zero();
     [[nodiscard]] bool is_none() const { return yaw_rad == 0 && shift_m.isZero(0); }
+    [[nodiscard]] Pose pose() const { return {so3::from_yaw(yaw_rad), shift_m}; }
   };
   static Odometry moved(const Odometry& odometry, const Offset& offset);
-  /// What lays `odometry` over `common`.
-  static Offset between(const Odometry& common, const Odometry& odometry);
+  /// What lays one source over another, by what both said of the same moment.
+  [[nodiscard]] Offset between(std::size_t flying, std::size_t other) const;
   [[nodiscard]] bool has_failed(const Odometry& odometry) const;
   [[nodiscard]] std::optional<std::size_t> successor(
       const std::vector<const Odometry*>& sources) const;
-  void align_later(const std::vector<const Odometry*>& sources);
+  void align_later();
   [[nodiscard]] Odometry with_rest(const Odometry& odometry) const;
 
   FailoverConfig config_;
   std::vector<Offset> frames_;      ///< of each source's O
   std::vector<Stamp> sound_since_;  ///< -1: it is not
   std::size_t flying_ = 0;
-  Odometry common_;  ///< the newest given out
-  Offset rest_;      ///< still to be taken back; the turn about the vehicle
+  std::vector<PoseHistory> said_;  ///< by each source, in its own O
+  Odometry common_;                ///< the newest given out
+  PoseHistory given_out_;
+  // Still to be taken back. Sources differ in roll and pitch, too; about the vehicle, or its place
+  // would swing around O.
+  Vec3 rest_turn_rad_ = Vec3::Zero();  ///< rotation vector in O
+  Vec3 rest_shift_m_ = Vec3::Zero();
 };
 
 }  // namespace arex

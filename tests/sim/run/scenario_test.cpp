@@ -414,9 +414,9 @@ TEST(Scenario, TheFlownAreaIsWhereMissionAndOperatorLead) {
   const auto area_of = [](const std::vector<std::string>& settings) {
     return load_scenario({}, settings, {}).config.flown_area();
   };
-  const auto explored = area_of({"mission.kind=explore", "exploration.bounds.low_m=[-9, 3]",
+  const auto explored = area_of({"mission.kind=explore", "exploration.bounds.low_m=[-9, -3]",
                                  "exploration.bounds.high_m=[8, 12]"});
-  EXPECT_EQ(explored.min(), Vec2(-9, 0));
+  EXPECT_EQ(explored.min(), Vec2(-9, -3));
   EXPECT_EQ(explored.max(), Vec2(8, 12));
   const auto flown =
       area_of({"mission.kind=goals", "mission.waypoints_m=[[5, 1, 1], [7, -2, 1]]",

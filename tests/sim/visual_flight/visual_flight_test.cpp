@@ -19,23 +19,39 @@ struct Flown : test::Flown {
   int changes = 0;
 };
 
-/// What the controller saw from one estimate to the next, beyond its velocity.
+/// What the controller saw from one estimate to the next, beyond how the vehicle moved.
 struct Step {
   double time_s, step_m, turn_rad;
 };
 
+/// The true poses of a flight, at any stamp of it.
+class TruePoses {
+ public:
+  void add(const Truth& truth) { truths_.push_back(truth); }
+  [[nodiscard]] Pose at(Stamp stamp) const {
+    const auto next = std::lower_bound(truths_.begin(), truths_.end(), stamp,
+                                       [](const Truth& truth, Stamp t) { return truth.stamp < t; });
+    const Truth& near = next == truths_.end() ? truths_.back() : *next;
+    const double dt = to_seconds(stamp - near.stamp);
+    return {near.X_WB.R * so3::Exp(dt * near.w_WB_B), near.X_WB.p + dt * near.v_WB};
+  }
+
+ private:
+  std::vector<Truth> truths_;
+};
+
 Flown fly(const std::string& scenario, const std::vector<std::string>& overrides) {
   std::vector<Step> steps;
+  TruePoses truth;
   Odometry before;
   const auto look = [&](const Simulation& simulation) {
+    truth.add(simulation.truth());
     const Odometry now = simulation.view().odometry;
     if (now.stamp <= before.stamp) return;
     if (before.stamp > 0) {
-      const double dt = to_seconds(now.stamp - before.stamp);
-      const Mat3 turned = before.X_OB.R * so3::Exp(dt * before.w_OB_B);
-      steps.push_back({to_seconds(now.stamp),
-                       (now.X_OB.p - before.X_OB.p - dt * before.v_OB).norm(),
-                       so3::angle(turned.transpose() * now.X_OB.R)});
+      const Pose expected = before.X_OB * (truth.at(before.stamp).inverse() * truth.at(now.stamp));
+      steps.push_back({to_seconds(now.stamp), (now.X_OB.p - expected.p).norm(),
+                       so3::angle(expected.R.transpose() * now.X_OB.R)});
     }
     before = now;
   };

@@ -8,8 +8,8 @@
 
 #include "bag/replay_input.h"
 #include "bag/ros_bag.h"
-#include "config/config.h"
 #include "packed.h"
+#include "refusal.h"
 #include "sample_data.h"
 #include "support/temporary_folder.h"
 
@@ -192,15 +192,6 @@ TEST(RecordedCameras, GiveTheirImagesInOrderOfArrivalToWhoAsksForThem) {
   EXPECT_EQ(again.infrared_counts().used, 8U);
 }
 
-std::string refusal_of(const std::filesystem::path& file, const ReplayOptions& options) {
-  try {
-    ReplayInput(file, options);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(RecordedCameras, SayWhyACameraCannotBeUsed) {
   const TemporaryFolder folder;
   const auto expect_fault = [&](const Oddity& odd, const std::string& why, bool depth_stays) {
@@ -214,7 +205,7 @@ TEST(RecordedCameras, SayWhyACameraCannotBeUsed) {
     })) << why;
     ReplayOptions asked;
     asked.infrared_topic = kInfra1;
-    EXPECT_NE(refusal_of(folder / "a.bag", asked).find(why), std::string::npos) << why;
+    EXPECT_NE(test::refusal_of(folder / "a.bag", asked).find(why), std::string::npos) << why;
   };
   expect_fault({.distortion = 0.1}, "are distorted", false);
   expect_fault({.calibrated = false}, "no camera_info", false);
@@ -226,14 +217,16 @@ TEST(RecordedCameras, SayWhyACameraCannotBeUsed) {
   EXPECT_FALSE(ReplayInput(folder / "a.bag", {}).cameras().infrared());
   ReplayOptions asked;
   asked.infrared_topic = kInfra1;
-  EXPECT_NE(refusal_of(folder / "a.bag", asked).find("not the left eye of a grey pair"),
+  EXPECT_NE(test::refusal_of(folder / "a.bag", asked).find("not the left eye of a grey pair"),
             std::string::npos);
   asked = {};
   asked.depth_topic = "/camera/depth/image_rec_raw";
-  EXPECT_NE(refusal_of(folder / "a.bag", asked).find("did you mean '/camera/depth/image_rect_raw'"),
-            std::string::npos);
+  EXPECT_NE(
+      test::refusal_of(folder / "a.bag", asked).find("did you mean '/camera/depth/image_rect_raw'"),
+      std::string::npos);
   asked.depth_topic = "/camera/color/image_raw";
-  EXPECT_NE(refusal_of(folder / "a.bag", asked).find("is of encoding 'rgb8'"), std::string::npos);
+  EXPECT_NE(test::refusal_of(folder / "a.bag", asked).find("is of encoding 'rgb8'"),
+            std::string::npos);
 }
 
 TEST(RecordedCameras, OfOurOwnFlightComeBackToTheLastBit) {

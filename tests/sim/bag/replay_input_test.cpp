@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "bag/ros_bag.h"
-#include "config/config.h"
 #include "packed.h"
+#include "refusal.h"
 #include "sample_data.h"
 #include "support/temporary_folder.h"
 
@@ -215,15 +215,6 @@ TEST(ReplayInput, KnowsNoMountThatNobodySays) {
   EXPECT_FALSE(ReplayInput(folder / "b.bag", {}).X_BL());
 }
 
-std::string refusal_of(const std::filesystem::path& file, const ReplayOptions& options) {
-  try {
-    ReplayInput(file, options);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(ReplayInput, RefusesTopicsThatDoNotFit) {
   const TemporaryFolder folder;
   Foreign bag(folder / "a.bag");
@@ -231,19 +222,21 @@ TEST(ReplayInput, RefusesTopicsThatDoNotFit) {
   bag.close();
   ReplayOptions options;
   options.lidar_topic = "/os/pointz";
-  EXPECT_NE(refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
+  EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
             std::string::npos);
   options.lidar_topic = "/os/imu";
-  EXPECT_NE(refusal_of(folder / "a.bag", options).find("expected PointCloud2"), std::string::npos);
+  EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("expected PointCloud2"),
+            std::string::npos);
   options = {};
   options.truth_topic = "/os/imu";
-  EXPECT_NE(refusal_of(folder / "a.bag", options).find("expected Odometry"), std::string::npos);
+  EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("expected Odometry"),
+            std::string::npos);
   {
     Foreign without(folder / "b.bag");
     without.scan(0, 95);
     without.close();
   }
-  EXPECT_NE(refusal_of(folder / "b.bag", {}).find("holds no message of type sensor_msgs/Imu"),
+  EXPECT_NE(test::refusal_of(folder / "b.bag", {}).find("holds no message of type sensor_msgs/Imu"),
             std::string::npos);
   {
     Foreign broken(folder / "c.bag");
@@ -251,7 +244,7 @@ TEST(ReplayInput, RefusesTopicsThatDoNotFit) {
     broken.scan(0, 95);
     broken.close();
   }
-  EXPECT_NE(refusal_of(folder / "c.bag", {}).find("none of the first messages can be read"),
+  EXPECT_NE(test::refusal_of(folder / "c.bag", {}).find("none of the first messages can be read"),
             std::string::npos);
 }
 

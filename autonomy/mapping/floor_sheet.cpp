@@ -45,6 +45,9 @@ constexpr double kUnder = 25;
 constexpr int kMostUnder = 3;
 /// Layers of the vehicle above the floor that it flies over.
 constexpr double kLeastAbove = 3, kMostAbove = 35;
+/// Tiles about its way of which a vehicle that flies there has seen what there is to see.
+constexpr int kFlownBeside = 2;
+
 TilePlane shifted(const TilePlane& plane, const Eigen::Vector2i& step) {
   TilePlane there = plane;
   there.height += kBrickCells * (plane.rise.x() * step.x() + plane.rise.y() * step.y());
@@ -96,10 +99,12 @@ void FloorSheet::note_place(const Eigen::Vector2i& tile, int layer) {
     step_to(way_.back().tile + left.cwiseSign(), layer);
     changed_ = true;
   }
+  if (changed_) cut_short();
 }
 
 /// A loop is cut where the way comes beside itself on the same storey.
 void FloorSheet::step_to(const Eigen::Vector2i& tile, int layer) {
+  note_flown(tile, layer);
   const double here = tiles_[index(way_.back().tile)].shown.plane.height;
   const auto again = std::find_if(way_.begin(), way_.end() - 1, [&](const Place& p) {
     return (p.tile - tile).cwiseAbs().maxCoeff() <= 1 &&
@@ -107,6 +112,53 @@ void FloorSheet::step_to(const Eigen::Vector2i& tile, int layer) {
   });
   if (again != way_.end() - 1) way_.erase(again + 1, way_.end());
   if (way_.back().tile != tile) way_.push_back({tile, layer});
+}
+
+void FloorSheet::note_flown(const Eigen::Vector2i& tile, int layer) {
+  for (int y = tile.y() - kFlownBeside; y <= tile.y() + kFlownBeside; ++y) {
+    for (int x = tile.x() - kFlownBeside; x <= tile.x() + kFlownBeside; ++x) {
+      if (!contains({x, y})) continue;
+      int& flown = tiles_[index({x, y})].flown;
+      flown = std::min(flown, layer);
+    }
+  }
+}
+
+/// Whether what is shown of two neighbours is one floor.
+bool FloorSheet::meet(std::size_t from, std::size_t to, const Eigen::Vector2i& step) const {
+  const Label& a = tiles_[from].shown;
+  const Label& b = tiles_[to].shown;
+  if (!a.known || !a.seen || !b.known || !b.seen) return false;
+  const Vec2 edge = 0.5 * kBrickCells * step.cast<double>();
+  return std::abs(a.plane.height + a.plane.rise.dot(edge) -
+                  (b.plane.height - b.plane.rise.dot(edge))) <= kTolerance + kMeet;
+}
+
+/// The way goes straight where the floor does: round a yard and into the ramp at its middle, the
+/// way home leads up the ramp, not once more round the yard.
+void FloorSheet::cut_short() {
+  const Place last = way_.back();
+  const double above = last.layer - tiles_[index(last.tile)].shown.plane.height;
+  if (above < kLeastAbove || above > kMostAbove) return;  // another storey's floor is shown there
+  for (std::size_t k = 0; k + 2 < way_.size(); ++k) {
+    std::vector<Place> straight;
+    Eigen::Vector2i at = last.tile;
+    bool joined = true;
+    while (joined && at != way_[k].tile) {
+      const Vec2 left = (way_[k].tile - at).cast<double>();
+      const Eigen::Vector2i step =
+          (left / left.cwiseAbs().maxCoeff()).array().round().cast<int>().matrix();
+      joined = meet(index(at), index(at + step), step);
+      at += step;
+      const double floor = tiles_[index(at)].shown.plane.height;
+      straight.push_back({at, static_cast<int>(std::lround(floor + above))});
+    }
+    if (!joined || straight.size() + k + 1 >= way_.size()) continue;
+    way_.resize(k + 1);
+    way_.insert(way_.end(), straight.rbegin() + 1, straight.rend());
+    way_.push_back(last);
+    return;
+  }
 }
 
 std::optional<TilePlane> FloorSheet::plane(std::size_t tile) const {
@@ -139,8 +191,10 @@ std::vector<std::size_t> FloorSheet::spread() {
   }
   find_brinks(brinks);
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    if (brinks[t] == tiles_[t].brinks) continue;
+    const bool mouth = leads_under_the_way(t);
+    if (brinks[t] == tiles_[t].brinks && mouth == tiles_[t].mouth) continue;
     tiles_[t].brinks = brinks[t];
+    tiles_[t].mouth = mouth;
     changed.push_back(t);
   }
   return changed;
@@ -296,6 +350,27 @@ void FloorSheet::settle(std::size_t t) {
   }
 }
 
+/// Down a ramp or over level floor, not sideways out of a ramp, whose walls end it there.
+bool FloorSheet::leads_under_the_way(std::size_t t) const {
+  const Tile& here = tiles_[t];
+  const double below_vehicle =
+      tiles_[index(way_.back().tile)].label.plane.height - here.label.plane.height;
+  if (!here.label.known || here.pinned || below_vehicle <= kUnder) return false;
+  if (here.flown - here.label.plane.height <= kMostAbove) return false;
+  for (std::size_t s = 0; s < 4; ++s) {
+    const Eigen::Vector2i step(kDx[s], kDy[s]);
+    if (!contains(tile_of(t) + step)) continue;
+    const Tile& over = tiles_[index(tile_of(t) + step)];
+    if (!over.pinned || over.label.plane.rise.norm() >= kLevel) continue;
+    const double fall = -here.label.plane.rise.dot(step.cast<double>());
+    const double across =
+        std::abs(here.label.plane.rise.x() * step.y() - here.label.plane.rise.y() * step.x());
+    if (across > std::max(fall, kLevel)) continue;
+    if (over.label.plane.height - shifted(here.label.plane, step).height > kUnder) return true;
+  }
+  return false;
+}
+
 FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& step,
                                     std::size_t tile) const {
   Label label;
@@ -335,7 +410,11 @@ void FloorSheet::find_brinks(std::vector<std::uint64_t>& brinks) const {
       const Eigen::Vector2i step(kDx[s], kDy[s]);
       if (!contains(tile_of(t) + step)) continue;
       const Label& there = tiles_[index(tile_of(t) + step)].shown;
-      if (!there.known) continue;
+      if (!there.known) {
+        // The storey above, followed along the way home alone: what is beside it was left.
+        if (tiles_[t].pinned && !leads_on(t)) brinks[t] |= kSide[s];
+        continue;
+      }
       const auto edge = [&](const TilePlane& plane, int side) {
         const double half = 0.5 * kEnd * side;
         return plane.height + half * (plane.rise.x() * step.x() + plane.rise.y() * step.y());

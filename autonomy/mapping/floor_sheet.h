@@ -64,7 +64,9 @@ class ColumnLayers {
 /// and nothing is followed that lies more than 2 m above the vehicle's floor. Within `kCorridor_m`
 /// of the way home a tile keeps the floor that was flown over, whatever other storey comes near:
 /// the way home stays known. Where neighbours' floors do not meet the higher one ends: its last
-/// columns are brinks.
+/// columns are brinks. A floor that leads under one that is kept for the way home, and over which
+/// the vehicle never flew, ends in a mouth: what lies behind it cannot be shown while the vehicle
+/// is above, and is still to be explored.
 class FloorSheet {
  public:
   /// Voxels of one layer that are occupied over one that is not: where a surface or an object
@@ -85,7 +87,7 @@ class FloorSheet {
   /// nothing.
   void note_place(const Eigen::Vector2i& tile, int layer);
   /// Works the sheet out anew, if anything was said since it last did.
-  /// @return tiles whose plane or brinks have changed
+  /// @return tiles whose plane, brinks or mouth have changed
   std::vector<std::size_t> spread();
 
   /// None: nothing is known of the floor there, nor of any that leads there.
@@ -94,6 +96,8 @@ class FloorSheet {
   [[nodiscard]] bool is_seen(std::size_t tile) const { return tiles_[tile].shown.seen; }
   /// Columns at which the floor of a tile ends above that of its neighbour.
   [[nodiscard]] std::uint64_t brinks(std::size_t tile) const { return tiles_[tile].brinks; }
+  /// Whether the floor of a tile leads on to where the map can't show it yet.
+  [[nodiscard]] bool is_mouth(std::size_t tile) const { return tiles_[tile].mouth; }
 
   static constexpr double kCorridor_m = 2.0;
   static constexpr int kMostTolerance = 3;  ///< layers between a floor and where it is expected
@@ -115,9 +119,13 @@ class FloorSheet {
     Label label;  ///< as of this spreading
     Label shown;  ///< as handed out: stays while the label says the same
     std::uint64_t brinks = 0;
-    bool pinned = false;  ///< in the corridor
-    bool done = false;    ///< handed on to its neighbours
+    bool mouth = false;
+    int flown = kNeverFlown;  ///< the lowest layer that the vehicle was in, here or near
+    bool pinned = false;      ///< in the corridor
+    bool done = false;        ///< handed on to its neighbours
   };
+
+  static constexpr int kNeverFlown = 1 << 20;
 
   [[nodiscard]] std::size_t index(const Eigen::Vector2i& tile) const {
     return static_cast<std::size_t>(tile.y() * width_ + tile.x());
@@ -129,6 +137,9 @@ class FloorSheet {
     return tile.minCoeff() >= 0 && tile.x() < width_ && tile.y() < height_;
   }
   void step_to(const Eigen::Vector2i& tile, int layer);
+  void note_flown(const Eigen::Vector2i& tile, int layer);
+  void cut_short();
+  [[nodiscard]] bool meet(std::size_t from, std::size_t to, const Eigen::Vector2i& step) const;
   void follow_way();
   void pin_corridor();
   [[nodiscard]] bool leads_on(std::size_t tile) const;
@@ -137,6 +148,7 @@ class FloorSheet {
   void fill_unseen();
   void settle(std::size_t tile);
   void find_brinks(std::vector<std::uint64_t>& brinks) const;
+  [[nodiscard]] bool leads_under_the_way(std::size_t tile) const;
   /// The floor of `tile` if that of a neighbour goes on into it.
   [[nodiscard]] Label go_on(const Label& from, const Eigen::Vector2i& step, std::size_t tile) const;
   [[nodiscard]] std::optional<TilePlane> find_floor(const std::vector<Feet>& feet,
@@ -148,7 +160,7 @@ class FloorSheet {
   std::size_t corridor_;  ///< cost
   bool changed_ = true;
   std::vector<Tile> tiles_;
-  std::vector<Place> way_;  ///< from the start to the vehicle, without loops
+  std::vector<Place> way_;  ///< from the start to the vehicle, straight over floor that was seen
 };
 
 }  // namespace arex

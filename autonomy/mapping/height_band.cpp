@@ -214,7 +214,8 @@ void HeightBand::evaluate(std::size_t t) {
       }
     }
   }
-  const std::uint64_t enough = free[static_cast<std::size_t>(min_free_)];
+  const bool leads_on_unseen = sheet_ && sheet_->is_mouth(t);
+  const std::uint64_t enough = leads_on_unseen ? 0 : free[static_cast<std::size_t>(min_free_)];
   for (unsigned i = 0; i < 64; ++i) {
     const std::size_t cell = cell_of_bit(t, i);
     if (cell == map_.cells.size()) continue;

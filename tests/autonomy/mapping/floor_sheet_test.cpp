@@ -155,8 +155,61 @@ TEST(FloorSheet, FollowsARampDownIntoAHallUnderTheYard) {
     for (int x = 3; x < 17; ++x) {
       EXPECT_NEAR(height(sheet, x, 10), std::max(-80.0, -slope * (8 * x + 4 - 24)), 1.5) << x;
     }
-    EXPECT_NE(sheet.brinks(tile(1, 8)), 0U);  // the yard ends there
+    EXPECT_NE(sheet.brinks(tile(1, 7)) | sheet.brinks(tile(1, 8)), 0U);  // the yard ends there
     EXPECT_EQ(sheet.brinks(tile(10, 4)), 0U);
+  }
+}
+
+// Over a yard beneath which a hall lies, the way home keeps the yard on the map: the ramp that was
+// never flown ends before it, and is to be explored.
+TEST(FloorSheet, EndsARampInAMouthUnderAYardThatWasFlownOver) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    site.give_to(sheet, -60);  // from above
+    const auto mouths = [&] {
+      std::vector<std::size_t> found;
+      for (int t = 0; t < kWidth * kHeight; ++t) {
+        if (sheet.is_mouth(static_cast<std::size_t>(t)))
+          found.push_back(static_cast<std::size_t>(t));
+      }
+      return found;
+    };
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    EXPECT_TRUE(mouths().empty());
+    for (int y = 10; y < 17; ++y) sheet.note_place({1, y}, 13);
+    for (int x = 1; x < 20; ++x) sheet.note_place({x, 16}, 13);
+    for (int y = 16; y > 8; --y) sheet.note_place({20, y}, 13);
+    sheet.spread();
+    EXPECT_NEAR(height(sheet, 20, 9), 0, 1);
+    ASSERT_FALSE(mouths().empty());
+    for (const std::size_t t : mouths()) {
+      EXPECT_LT(sheet.plane(t)->height, -25) << t;  // not on the yard
+    }
+    // On round the yard, and down: the way home is up the ramp, not round the yard.
+    for (int y = 8; y > 4; --y) sheet.note_place({20, y}, 13);
+    for (int x = 20; x > 4; --x) sheet.note_place({x, 4}, 13);
+    for (int y = 4; y < 9; ++y) sheet.note_place({4, y}, 13);
+    sheet.spread();
+    for (int x = 4; x < 15; ++x) {
+      const double floor = -std::min(80.0, std::max(0.0, slope * (8 * x + 4 - 24)));
+      sheet.note_place({x, 8}, static_cast<int>(15 + floor));
+      sheet.spread();
+    }
+    // The yard beside the way home was left, and is nothing to climb back for.
+    EXPECT_NE(sheet.brinks(tile(0, 6)) | sheet.brinks(tile(0, 7)) | sheet.brinks(tile(0, 8)), 0U);
+    site.give_to(sheet);
+    for (int x = 15; x < 24; ++x) {
+      const double floor = -std::min(80.0, std::max(0.0, slope * (8 * x + 4 - 24)));
+      sheet.note_place({x, 8}, static_cast<int>(15 + floor));
+      sheet.spread();
+    }
+    EXPECT_TRUE(mouths().empty());
+    for (const int x : {21, 22, 23}) EXPECT_NEAR(height(sheet, x, 10), -80, 1) << x;
+    EXPECT_NEAR(height(sheet, 0, 10), 0, 1);
+    for (int x = 4; x < 16; ++x) EXPECT_NEAR(height(sheet, x, 9), -slope * (8 * x + 4 - 24), 1.5);
   }
 }
 

@@ -279,7 +279,9 @@ TEST(Scenario, ARegionThatNobodyCanExploreIsRefused) {
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
   // Bounds that only the end of the entry lies in are as good as any.
-  EXPECT_EQ(refusal("garage", {"exploration.bounds.low_m=[10, -25]"}), "");
+  EXPECT_EQ(refusal("garage", {"exploration.bounds.low_m=[10, -25]",
+                               "mission.entry_m=[[2, 0, 1.3], [16.7, 0, -7.2], [19, 0, -7.2]]"}),
+            "");
   EXPECT_EQ(refusal("forest_small", {"mapping.global.low_m=[-13, -11, -3]"}), "");
   // Other missions explore nothing.
   EXPECT_EQ(refusal("goals", {"exploration.bounds.low_m=[2, 2]"}), "");

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <string_view>
 #include <vector>
 
 #include "exploration/candidate.h"
@@ -7,17 +9,24 @@
 
 namespace arex {
 
+/// Whether case C goes with the direction term or stands for itself.
+enum class CaseC { kDirected, kAlways, kNever };
+inline constexpr std::array<std::string_view, 3> kCaseCNames{"directed", "always", "never"};
+constexpr const std::array<std::string_view, 3>& enum_names(CaseC) { return kCaseCNames; }
+
 struct CandidateFilterConfig {
   double obstacle_distance_m = 0.4;  ///< case A
   double min_gain_m2 = 0.2;          ///< case B (rrt_exploration)
-  double max_angle_rad = 2.1;        ///< case C: 120 deg; the paper prints no value
+  CaseC case_c = CaseC::kDirected;
+  double max_angle_rad = 2.1;  ///< case C: 120 deg; the paper prints no value
 
   void fields(auto& f) {
     f("obstacle_distance_m", obstacle_distance_m, "case A: nearer to an obstacle is dropped");
     f("min_gain_m2", min_gain_m2, "case B: less unknown area is dropped (rrt_exploration)");
+    f("case_c", case_c, "case C applies where the revenue is direction-aware, always, or never");
     f("max_angle_rad", max_angle_rad,
-      "case C: further from the exploration direction is dropped, unless that leaves none; only "
-      "where direction-aware");
+      "case C: further from the exploration direction is dropped, unless that leaves none; the "
+      "paper prints no width");
     f.check(obstacle_distance_m >= 0, "obstacle_distance_m >= 0");
     f.check(min_gain_m2 >= 0, "min_gain_m2 >= 0");
     f.check(max_angle_rad >= 0, "max_angle_rad >= 0");

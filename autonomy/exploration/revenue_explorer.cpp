@@ -41,8 +41,10 @@ std::vector<Candidate> RevenueExplorer::assess(Source source, const ExplorationS
 }
 
 void RevenueExplorer::select(Decision& decision) {
-  if (config().revenue.direction_aware) {
-    decision.undirected_winner = best_undirected(decision.candidates);
+  const bool directed = config().revenue.direction_aware;
+  const CaseC case_c = config().filter.case_c;
+  if (directed) decision.undirected_winner = best_undirected(decision.candidates);
+  if (case_c == CaseC::kAlways || (case_c == CaseC::kDirected && directed)) {
     apply_direction_filter(decision.candidates, config().filter);
   }
   decision.winner = best_candidate(decision.candidates);

@@ -399,11 +399,15 @@ TEST(Explorer, FliesAtItsHeightAboveTheGroundOfTheGoal) {
   }
 }
 
-TEST(Explorer, CaseCActsOnlyWhereDirectionAware) {
-  for (const bool aware : {true, false}) {
+TEST(Explorer, CaseCActsWhereDirectionAwareUnlessToldOtherwise) {
+  for (const auto& [aware, case_c, acts] : {std::tuple{true, CaseC::kDirected, true},
+                                            {false, CaseC::kDirected, false},
+                                            {false, CaseC::kAlways, true},
+                                            {true, CaseC::kNever, false}}) {
     // Free in the middle, unknown at both ends; the first two targets go east.
     Hall hall;
     hall.config.revenue.direction_aware = aware;
+    hall.config.filter.case_c = case_c;
     test::fill(hall.map, {1, 1}, {20, 78}, OccupancyMap2D::kUnknown);
     hall.input.p_OB = {4, 0, 1.5};
     RevenueExplorer explorer(hall.config, 0.1, 1);
@@ -415,10 +419,10 @@ TEST(Explorer, CaseCActsOnlyWhereDirectionAware) {
     hall.input.p_OB = {-7, 0, 1.5};  // carried back: the west is near now
     const Decision d = explorer.decide(hall.map, hall.input);
     ASSERT_EQ(d.kind, DecisionKind::kNewTarget);
-    EXPECT_EQ(d.target.x() > 0, aware);
+    EXPECT_EQ(d.target.x() > 0, aware || acts);
     int off = 0;
     for (const Candidate& c : d.candidates) off += c.verdict == Verdict::kOffDirection;
-    EXPECT_EQ(off > 0, aware);
+    EXPECT_EQ(off > 0, acts);
   }
 }
 

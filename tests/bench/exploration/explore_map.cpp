@@ -3,10 +3,11 @@
 //
 //   explore_map RUN [key=value ...]
 //
-// RUN is the folder of a flight of one storey: its map2d is taken for the world, its resolved.yaml for
-// the configuration, with the keys said over it (exploration.strategy=nearest, plug-ins included). The
-// vehicle sees 20 m in the plane without error and flies 1.4 m a second along the shortest known
-// way, a decision each second. Prints what it flew up to 90, 99 and 99.9 % of the area, and in all.
+// RUN is the folder of a flight of one storey: its map2d is taken for the world, its resolved.yaml
+// for the configuration, with the keys said over it (exploration.strategy=nearest, plug-ins
+// included). The vehicle sees 20 m in the plane without error and flies 1.4 m a second along the
+// shortest known way, a decision each second. Prints what it flew up to 90, 99 and 99.9 % of the
+// area, and in all.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -99,27 +99,53 @@ TilePlane fit_plane(const Samples& samples, const Vec2& expected_rise) {
   return plane;
 }
 
+/// To the nearest, halves away from zero.
+int layer_of(double height) { return static_cast<int>(height + std::copysign(0.5, height)); }
+
+// A plane is lowest and highest at corners.
+int lowest_layer(const TilePlane& plane) {
+  constexpr double kEnd = kBrickCells - 1;
+  return layer_of(plane.at(plane.rise.x() > 0 ? 0 : kEnd, plane.rise.y() > 0 ? 0 : kEnd));
+}
+int highest_layer(const TilePlane& plane) {
+  constexpr double kEnd = kBrickCells - 1;
+  return layer_of(plane.at(plane.rise.x() > 0 ? kEnd : 0, plane.rise.y() > 0 ? kEnd : 0));
+}
+
+/// The places of a tile's columns.
+constexpr std::array<double, 64> column_places(int axis) {
+  std::array<double, 64> places{};
+  for (int i = 0; i < 64; ++i) {
+    const int along = (i >> axis & 1) | (i >> (axis + 2) & 1) << 1 | (i >> (axis + 4) & 1) << 2;
+    places[static_cast<std::size_t>(i)] = along;
+  }
+  return places;
+}
+constexpr std::array<double, 64> kColumnX = column_places(0), kColumnY = column_places(1);
+
 }  // namespace
 
 ColumnLayers::ColumnLayers(const TilePlane& plane) {
-  std::array<int, 64> layers{};
-  for (int i = 0; i < 64; ++i) {
-    layers[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(plane.at(x_of(i), y_of(i))));
+  low_ = lowest_layer(plane);
+  count_ = highest_layer(plane) - low_ + 1;
+  if (count_ == 1) {  // of a level floor
+    columns_[0] = ~std::uint64_t{0};
+    return;
   }
-  low_ = *std::min_element(layers.begin(), layers.end());
-  count_ = *std::max_element(layers.begin(), layers.end()) - low_ + 1;
-  for (std::size_t i = 0; i < 64; ++i) {
-    columns_[static_cast<std::size_t>(layers[i] - low_)] |= std::uint64_t{1} << i;
+  for (unsigned i = 0; i < 64; ++i) {
+    const int layer = layer_of(plane.at(kColumnX[i], kColumnY[i]));
+    columns_[static_cast<std::size_t>(layer - low_)] |= std::uint64_t{1} << i;
   }
 }
 
 std::optional<TilePlane> FloorSheet::find_floor(const std::vector<Feet>& feet,
                                                 const TilePlane& expected, int tolerance) const {
-  const ColumnLayers layers(expected);
-  const int low = layers.lowest() - kReach, high = layers.highest() + kReach;
+  const int low = lowest_layer(expected) - kReach, high = highest_layer(expected) + kReach;
   const auto from = [](const Feet& f, int layer) { return f.layer < layer; };
   const auto begin = std::lower_bound(feet.begin(), feet.end(), low, from);
   const std::span<const Feet> near(begin, std::lower_bound(begin, feet.end(), high, from));
+  if (near.empty()) return std::nullopt;
+  const ColumnLayers layers(expected);
   std::array<std::uint64_t, kMostLayers> floor{};
   for (std::size_t k = 0; k < near.size(); ++k) {
     const int layer = near[k].layer;

@@ -174,7 +174,7 @@ void Ahrs::add_magnetometer(const MagnetometerSample& sample) {
   correct(H, -heading_error, sigma * sigma, true);
 }
 
-void Ahrs::add_barometer(const BarometerSample& sample) {
+void Ahrs::add_barometer(const BarometerSample& sample, double noise_pa) {
   if (!initialised_) {
     static_.pressure += sample.pressure_pa;
     ++static_.pressures;
@@ -183,7 +183,8 @@ void Ahrs::add_barometer(const BarometerSample& sample) {
   if (ground_pressure_pa_ <= 0) ground_pressure_pa_ = sample.pressure_pa;
   Row H = Row::Zero();
   H[kHeight] = 1;
-  const double sigma = config_.barometer_noise_m;
+  const double sigma = std::max(config_.barometer_noise_m,
+                                height_above(sample.pressure_pa + noise_pa, sample.pressure_pa));
   correct(H, height_above(ground_pressure_pa_, sample.pressure_pa) - height_, sigma * sigma, false);
 }
 

@@ -30,7 +30,8 @@ class Ahrs {
   /// Collects the static window, then propagates. @pre stamps increase.
   void add_imu(const ImuSample& imu);
   void add_magnetometer(const MagnetometerSample& sample);
-  void add_barometer(const BarometerSample& sample);
+  /// @param noise_pa RMS of its readings, as far as it is known to be a noisy one
+  void add_barometer(const BarometerSample& sample, double noise_pa = 0);
 
   /// Whether the vehicle stands on the ground: its velocity is zero. Initially so.
   void set_on_ground(bool on_ground);

@@ -47,8 +47,9 @@ void Autopilot::add_magnetometer(const MagnetometerSample& sample) {
 }
 
 void Autopilot::add_barometer(const BarometerSample& sample) {
-  ahrs_.add_barometer(sample);
   health_.add_barometer(now_, sample);
+  // By a noisy one the vehicle would seem to climb and sink in turn, on the ground as well.
+  ahrs_.add_barometer(sample, health_.pressure_noise_pa());
 }
 
 void Autopilot::add_battery(const BatterySample& sample) {

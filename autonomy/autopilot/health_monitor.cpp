@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -10,8 +9,6 @@
 
 namespace arex {
 namespace {
-
-constexpr double kStepMemory = 50;  // readings
 
 // An IMU at 1 kHz flies the vehicle: it is missed at once. The others correct slowly.
 constexpr StreamWatchConfig kImuStream{.silent_s = 0.02, .stuck_readings = 50, .late_s = 0.004};
@@ -22,17 +19,6 @@ constexpr StreamWatchConfig kPowerStream{.silent_s = 0.2, .stuck_readings = 100}
 
 }  // namespace
 
-void HealthMonitor::Steps::add(const Vec3& value, double share) {
-  // One jump, as when a stuck sensor comes back, is no noise: it counts for little at first.
-  constexpr double kOutlier = 25, kLeast = 1e-9;
-  const double step = (value - last).squaredNorm();
-  if (squares >= 0) {
-    squares += share * (std::min(step, kOutlier * std::max(squares, kLeast)) - squares);
-  }
-  squares = std::max(squares, 0.0);
-  last = value;
-}
-
 HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& mix,
                              double weight_n)
     : config_(config),
@@ -41,7 +27,9 @@ HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& 
       barometer_("barometer", kPressureStream),
       power_("power", kPowerStream),
       vibration_(config.vibration, kFlightImuHz),
-      motors_(config.motor, mix, weight_n) {}
+      motors_(config.motor, mix, weight_n),
+      field_("magnetometer", config.field_step_gauss),
+      pressure_("barometer", config.pressure_step_pa) {}
 
 void HealthMonitor::add_imu(Stamp now, const ImuSample& imu) {
   const Vec3 &w = imu.gyro_radps, &a = imu.accel_mps2;
@@ -51,12 +39,12 @@ void HealthMonitor::add_imu(Stamp now, const ImuSample& imu) {
 
 void HealthMonitor::add_magnetometer(Stamp now, const MagnetometerSample& sample) {
   magnetometer_.add(now, sample.stamp, {sample.field_gauss.data(), 3});
-  field_.add(sample.field_gauss, 1 / kStepMemory);
+  field_.add(sample.field_gauss);
 }
 
 void HealthMonitor::add_barometer(Stamp now, const BarometerSample& sample) {
   barometer_.add(now, sample.stamp, {&sample.pressure_pa, 1});
-  pressure_.add(Vec3(sample.pressure_pa, 0, 0), 1 / kStepMemory);
+  pressure_.add(Vec3(sample.pressure_pa, 0, 0));
 }
 
 void HealthMonitor::add_battery(Stamp now, const BatterySample& sample) {
@@ -66,8 +54,8 @@ void HealthMonitor::add_battery(Stamp now, const BatterySample& sample) {
 
 void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {
   watch_streams(now, flight.in_air);
-  watch_noise(now, field_, config_.field_step_gauss, "magnetometer");
-  watch_noise(now, pressure_, config_.pressure_step_pa, "barometer");
+  watch_noise(now, field_);
+  watch_noise(now, pressure_);
   // On the ground the motors idle, and hands may shake it.
   const auto shaken = vibration_.update();
   if (shaken && flight.armed) report(now, EventKind::kVibration, "autopilot: " + *shaken);
@@ -93,16 +81,13 @@ void HealthMonitor::watch_streams(Stamp now, bool in_air) {
   }
 }
 
-void HealthMonitor::watch_noise(Stamp now, Steps& steps, double limit, const std::string& name) {
-  constexpr double kOver = 0.5;  // of the limit: it has ended
-  const double rms = std::sqrt(std::max(steps.squares, 0.0));
-  if (!steps.told && rms > limit) {
-    steps.told = true;
-    report(now, EventKind::kSensorFault, name + " noisy");
-  } else if (steps.told && rms < kOver * limit) {
-    steps.told = false;
-    report(now, EventKind::kSensorFault, name + " quiet again");
-  }
+void HealthMonitor::watch_noise(Stamp now, NoiseWatch& watch) {
+  if (auto change = watch.update()) report(now, EventKind::kSensorFault, *std::move(change));
+}
+
+double HealthMonitor::pressure_noise_pa() const {
+  // A step is the difference of two readings.
+  return pressure_.noisy() ? pressure_.step_rms() / std::numbers::sqrt2 : 0;
 }
 
 void HealthMonitor::watch_tilt(Stamp now, const Flight& flight, double dt_s) {

@@ -6,6 +6,7 @@
 #include "autopilot/health_config.h"
 #include "autopilot/motor_watch.h"
 #include "autopilot/pack_watch.h"
+#include "math/noise_watch.h"
 #include "math/stream_watch.h"
 #include "math/vibration_watch.h"
 #include "messages/events.h"
@@ -40,19 +41,13 @@ class HealthMonitor {
 
   [[nodiscard]] const MotorWatch& motors() const { return motors_; }
   [[nodiscard]] const VibrationWatch& vibration() const { return vibration_; }
+  /// RMS of a barometer reading that was told to be noisy, Pa; 0 of a sound one.
+  [[nodiscard]] double pressure_noise_pa() const;
 
  private:
-  /// Mean square of the steps between readings of a sensor, over a second or so.
-  struct Steps {
-    Vec3 last = Vec3::Zero();
-    double squares = -1;  ///< -1: no reading yet
-    bool told = false;
-    void add(const Vec3& value, double share);
-  };
-
   void report(Stamp now, EventKind kind, std::string detail);
   void watch_streams(Stamp now, bool in_air);
-  void watch_noise(Stamp now, Steps& steps, double limit, const std::string& name);
+  void watch_noise(Stamp now, NoiseWatch& watch);
   void watch_tilt(Stamp now, const Flight& flight, double dt_s);
   void watch_battery(Stamp now);
 
@@ -61,7 +56,7 @@ class HealthMonitor {
   VibrationWatch vibration_;
   MotorWatch motors_;
   PackWatch pack_;
-  Steps field_, pressure_;
+  NoiseWatch field_, pressure_;
   double tilted_s_ = 0;
   bool tilt_told_ = false;
   bool pack_told_ = false;

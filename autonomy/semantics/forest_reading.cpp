@@ -197,13 +197,9 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
   const std::vector<float>& heights = reading.heights;
   const ColumnIndex index(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
   std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
-  add_slender_stems(find_slender_stems(cloud, index, heights, config.stem), stems);
-  std::vector<StemEvidence> posts;
-  std::erase_if(stems, [&](const StemEvidence& stem) {
-    const bool post = is_post(stem, cloud, index, heights);
-    if (post) posts.push_back(stem);
-    return post;
-  });
+  std::vector<StemEvidence> slender = find_slender_stems(cloud, index, heights, config.stem);
+  const std::vector<StemEvidence> posts = take_posts(slender, stems, cloud, index, heights);
+  add_slender_stems(slender, stems);
 
   const StemFollower follower(cloud, index, heights);
   const auto label = [&](const StemEvidence& e, SemanticClass kind) {

@@ -21,6 +21,7 @@ constexpr double kRangeNoise = 0.02;  // m, of a point
 constexpr double kMiddle = 1.0;       // m above the ground, where lines are anchored
 constexpr double kLineTop = 2.0;      // m, of the part that is fitted
 constexpr double kSameStem = 0.25;    // m, between lines
+constexpr double kSamePost = 0.15;    // m, between a post and a stem that is none
 
 /// The layers of a slender stem that count, from LayerRaster::kLowest on.
 constexpr int kLineLayers = 16;   // up to 1.8 m
@@ -221,6 +222,34 @@ constexpr double kShaftLow = 0.3, kShaftHigh = 2.9, kPostTop = 3.1, kAbove = 0.7
 constexpr ShaftPrior kPostPrior{
     .radius = 0.05, .radius_sigma = 0.015, .taper = 0, .taper_sigma = 0.02};
 
+/// Where a plumb line near `about` has most company in all layers.
+Vec2 plumb_line(const std::vector<Vec3>& points, Vec2 about) {
+  constexpr std::array kScales{0.12, 0.10, 0.08, 0.06, 0.06, 0.06};  // m
+  constexpr double kFaint = 0.2;  // weight of a layer that counts in full
+  constexpr std::size_t kLayers = 32;
+  for (const double scale : kScales) {
+    std::array<double, kLayers> weight{};
+    std::array<Vec2, kLayers> sum;
+    sum.fill(Vec2::Zero());
+    for (const Vec3& p : points) {
+      const auto layer =
+          std::min(kLayers - 1, static_cast<std::size_t>(p.z() / LayerRaster::kLayer));
+      const double w = geman_mcclure((p.head<2>() - about).norm(), scale);
+      weight[layer] += w;
+      sum[layer] += w * p.head<2>();
+    }
+    Vec2 all = 1e-6 * about;
+    double of_all = 1e-6;
+    for (std::size_t i = 0; i < kLayers; ++i) {
+      const double counts = 1 / std::max(kFaint, weight[i]);
+      all += counts * sum[i];
+      of_all += counts * weight[i];
+    }
+    about = all / of_all;
+  }
+  return about;
+}
+
 /// How a shaft looks where a tree has grown thin and hides in its leaves, and where it goes on.
 struct UpperPart {
   double filled = 0;  ///< share of the layers with points on the surface
@@ -325,23 +354,63 @@ void add_slender_stems(const std::vector<StemEvidence>& slender, std::vector<Ste
   }
 }
 
-bool is_post(const StemEvidence& stem, const WorkingCloud& cloud, const ColumnIndex& index,
-             const std::vector<float>& heights) {
+std::optional<StemEvidence> post_at(const Stem& about, const WorkingCloud& cloud,
+                                    const ColumnIndex& index, const std::vector<float>& heights) {
   constexpr double kThickest = 0.15;               // m, radius
   constexpr double kPlumb = 0.025, kEven = 0.015;  // per metre
   constexpr double kLeastFilled = 0.6, kLeastOwn = 0.62, kMostAbove = 0.2;
-  if (stem.stem.radius > kThickest) return false;
-  const std::vector<Vec3> points =
-      points_near(cloud, index, heights, stem.stem.centre, stem.stem.radius + 0.25, kShaftLow,
-                  kPostTop + kAbove);
+  // Trees that a plumb shaft happens to fit reach 0.55: it has their leaves around and inside.
+  constexpr double kLeastConfidence = 0.56;
+  constexpr double kSure = 0.75, kLeastOwnIfSure = 0.5;
+  if (about.radius > kThickest) return std::nullopt;
+  const std::vector<Vec3> points = points_near(cloud, index, heights, about.centre,
+                                               about.radius + 0.25, kShaftLow, kPostTop + kAbove);
   std::vector<Vec3> lower;
   std::copy_if(points.begin(), points.end(), std::back_inserter(lower),
                [](const Vec3& p) { return p.z() <= kShaftHigh; });
-  const auto shaft = fit_shaft(lower, stem.stem, kPostPrior);
-  if (!shaft) return false;
-  const UpperPart upper = upper_part(points, *shaft);
-  return shaft->lean.norm() < kPlumb && std::abs(shaft->taper) < kEven &&
-         upper.filled >= kLeastFilled && upper.own >= kLeastOwn && upper.above <= kMostAbove;
+  // As the stem was fitted, and as a plumb line would stand there: leaves draw a free fit aside.
+  for (const Stem& start : {about, Stem{plumb_line(lower, about.centre), Vec2::Zero(), 0, 0}}) {
+    const auto shaft = fit_shaft(lower, start, kPostPrior);
+    if (!shaft) continue;
+    const UpperPart upper = upper_part(points, *shaft);
+    if (shaft->lean.norm() < kPlumb && std::abs(shaft->taper) < kEven &&
+        upper.filled >= kLeastFilled && upper.above <= kMostAbove) {
+      const StemEvidence post = weigh_stem(lower, *shaft);
+      const bool sure = post.confidence() >= kSure;
+      if (upper.own >= (sure ? kLeastOwnIfSure : kLeastOwn) &&
+          post.confidence() >= kLeastConfidence) {
+        return post;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<StemEvidence> take_posts(std::vector<StemEvidence>& slender,
+                                     std::vector<StemEvidence>& stems, const WorkingCloud& cloud,
+                                     const ColumnIndex& index, const std::vector<float>& heights) {
+  std::vector<StemEvidence> posts;
+  for (const std::vector<StemEvidence>* candidates : {&slender, &stems}) {
+    for (const StemEvidence& candidate : *candidates) {
+      const auto post = post_at(candidate.stem, cloud, index, heights);
+      if (!post) continue;
+      const bool known = std::any_of(posts.begin(), posts.end(), [&](const StemEvidence& other) {
+        return (other.stem.centre - post->stem.centre).norm() < kSameStem;
+      });
+      if (!known) posts.push_back(*post);
+    }
+  }
+  const auto is_near_post = [&](const StemEvidence& stem, double reach) {
+    return std::any_of(posts.begin(), posts.end(), [&](const StemEvidence& post) {
+      return (stem.stem.centre - post.stem.centre).norm() < reach;
+    });
+  };
+  std::erase_if(slender, [&](const StemEvidence& line) { return is_near_post(line, kSamePost); });
+  // A cone whose surface the post stands in was fitted through it and leaves beside it.
+  std::erase_if(stems, [&](const StemEvidence& stem) {
+    return is_near_post(stem, std::max(kSamePost, stem.stem.radius + kCore));
+  });
+  return posts;
 }
 
 }  // namespace arex

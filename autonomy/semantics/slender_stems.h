@@ -27,9 +27,12 @@ std::vector<StemEvidence> find_slender_stems(const WorkingCloud& cloud, const Co
 /// thicker than the line in it was fitted through leaves, and the line is taken.
 void add_slender_stems(const std::vector<StemEvidence>& slender, std::vector<StemEvidence>& stems);
 
-/// Whether a stem is a post, of a trellis or a fence: plumb, straight, as thick at its top as at
-/// its foot, and bare above it. Trees lean, taper and go on.
-bool is_post(const StemEvidence& stem, const WorkingCloud& cloud, const ColumnIndex& index,
-             const std::vector<float>& heights);
+/// Takes the posts, of a trellis or a fence, out of slender stems and those found by their girth:
+/// plumb, straight, as thick at their top as at their foot, and bare above it. Trees lean, taper
+/// and go on. Before the two are brought together: a cone through a post may hide the tree beside
+/// it.
+std::vector<StemEvidence> take_posts(std::vector<StemEvidence>& slender,
+                                     std::vector<StemEvidence>& stems, const WorkingCloud& cloud,
+                                     const ColumnIndex& index, const std::vector<float>& heights);
 
 }  // namespace arex

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -13,6 +14,8 @@ namespace {
 constexpr double kImuHz = 200;
 constexpr double kImageMemory = 50;  // frames
 constexpr int kPixelStep = 8;        // a survey needs no more of 400,000 pixels
+constexpr int kGlare = 20;           // pixels to each side: beyond what an edge or a twig hides
+constexpr int kFewSurfaces = 300;    // pixels; of fewer no share is told
 
 constexpr StreamWatchConfig kImuStream{
     .silent_s = 0.03, .stuck_readings = 20, .late_s = 0.006, .learnt_readings = 100};
@@ -26,7 +29,27 @@ constexpr StreamWatchConfig kMocapStream{.silent_s = 0.1, .stuck_readings = 40};
 struct Survey {
   double valid = 0;  ///< share of the pixels looked at
   double rough = 0;  ///< mean deviation from the neighbours' mean, of the depth
+  double holes = 0;  ///< of the pixels with one surface on both sides, the share without a depth
+  bool surfaces = false;  ///< there are enough of those to tell
 };
+
+/// Where the pixels left and right show one surface, a sound camera has a depth between them; sky
+/// and what is out of range leave no such holes.
+void survey_holes(const DepthImage& image, Survey& survey) {
+  constexpr float kSameSurface = 0.05F;  // of the depth
+  int between = 0, holes = 0;
+  for (int v = 0; v < image.camera.height; v += kPixelStep) {
+    for (int u = kGlare; u + kGlare < image.camera.width; u += kPixelStep) {
+      const float left = image.at(u - kGlare, v), right = image.at(u + kGlare, v);
+      if (left == 0 || right == 0) continue;
+      if (std::abs(left - right) > kSameSurface * std::min(left, right)) continue;
+      ++between;
+      holes += image.at(u, v) == 0;
+    }
+  }
+  survey.surfaces = between >= kFewSurfaces;
+  if (survey.surfaces) survey.holes = static_cast<double>(holes) / between;
+}
 
 Survey survey(const DepthImage& image) {
   constexpr float kSameSurface = 0.1F;  // of the depth
@@ -50,13 +73,17 @@ Survey survey(const DepthImage& image) {
   }
   if (looked == 0) return {};
   constexpr int kFew = 100;  // say nothing
-  return {static_cast<double>(valid) / looked, smooth >= kFew ? deviation / smooth : 0};
+  Survey seen;
+  seen.valid = static_cast<double>(valid) / looked;
+  if (smooth >= kFew) seen.rough = deviation / smooth;
+  survey_holes(image, seen);
+  return seen;
 }
 
 }  // namespace
 
 HealthWatch::HealthWatch(const HealthWatchConfig& config)
-    : config_(config), vibration_(config.vibration, kImuHz) {}
+    : config_(config), vibration_(config.vibration, kImuHz), field_(config.field_step_gauss) {}
 
 StreamWatch& HealthWatch::stream(const std::string& name, const StreamWatchConfig& config) {
   return streams_.try_emplace(name, name, config).first->second;
@@ -67,6 +94,7 @@ void HealthWatch::add_imu(Stamp now, const ImuSample& imu) {
   stream("imu", kImuStream)
       .add(now, imu.stamp, std::array{w.x(), w.y(), w.z(), a.x(), a.y(), a.z()});
   vibration_.add(w, a);
+  field_.add(imu.field_gauss);
 }
 
 void HealthWatch::add_scan(Stamp now, const LidarScan& scan) {
@@ -90,12 +118,21 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   const bool blind = seen.valid < config_.blind_share * images.usual_valid;
   const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_fraction &&
                      seen.rough > config_.rough_factor * images.usual_rough;
+  if (images.usual_holes < 0 && seen.surfaces) images.usual_holes = seen.holes;
+  const bool tells = !blind && seen.surfaces;
+  constexpr double kOver = 0.5;  // of the limit: it has ended
+  const double limit = (images.told_holes ? kOver : 1) * config_.holes_share;
+  const bool holes = tells && seen.holes > images.usual_holes + limit;
+  if (tells) images.holes = holes ? images.holes + 1 : 0;
   images.blind = blind ? images.blind + 1 : 0;
   images.rough = rough ? images.rough + 1 : 0;
   // What is wrong does not become usual.
   if (!blind) images.usual_valid += (seen.valid - images.usual_valid) / kImageMemory;
   if (!rough && seen.rough > 0) {
     images.usual_rough += (seen.rough - images.usual_rough) / kImageMemory;
+  }
+  if (tells && !holes) {
+    images.usual_holes += (seen.holes - images.usual_holes) / kImageMemory;
   }
   tell_images(now, name, images);
 }
@@ -111,6 +148,7 @@ void HealthWatch::tell_images(Stamp now, const std::string& name, Images& images
     }
   };
   tell(images.blind, images.told_blind, "blinded");
+  tell(images.holes, images.told_holes, "blinded in part");
   tell(images.rough, images.told_rough, "noisy");
 }
 
@@ -135,6 +173,9 @@ std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
     if (auto change = stream.update(now, flight.in_air)) {
       report(now, EventKind::kSensorFault, *std::move(change));
     }
+  }
+  if (auto change = field_.update(flight.in_air)) {
+    report(now, EventKind::kSensorFault, *std::move(change));
   }
   const auto shaken = vibration_.update();
   if (shaken && flight.armed) report(now, EventKind::kVibration, *shaken);

@@ -8,6 +8,7 @@
 #include "math/vibration_watch.h"
 #include "messages/events.h"
 #include "messages/sensors.h"
+#include "stack/field_watch.h"
 #include "stack/health_watch_config.h"
 
 namespace arex {
@@ -40,8 +41,9 @@ class HealthWatch {
   struct Images {
     double usual_valid = -1;  ///< share; -1: none yet
     double usual_rough = -1;
-    int blind = 0, rough = 0;  ///< frames in a row
-    bool told_blind = false, told_rough = false;
+    double usual_holes = -1;
+    int blind = 0, rough = 0, holes = 0;  ///< frames in a row
+    bool told_blind = false, told_rough = false, told_holes = false;
   };
   /// Something that must last before it is told.
   struct Lasting {
@@ -59,6 +61,7 @@ class HealthWatch {
   VibrationWatch vibration_;
   std::map<std::string, StreamWatch> streams_;
   std::map<std::string, Images> images_;
+  FieldWatch field_;
   Lasting contradicts_, off_path_;
   std::vector<Event> events_;
 };

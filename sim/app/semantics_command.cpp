@@ -1,7 +1,11 @@
 #include <array>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "app/commands.h"
 #include "config/config.h"
@@ -10,6 +14,9 @@
 #include "report/run_record.h"
 #include "run/file_io.h"
 #include "run/run_folder.h"
+#include "run/scenario.h"
+#include "scoring/odometry_error.h"
+#include "scoring/semantic_score.h"
 #include "semantics/cloud_file.h"
 #include "semantics/pcl_models.h"
 #include "semantics/semantic_picture.h"
@@ -20,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 3> kOutputs{"semantic.pcd", "objects.csv", "semantic.png"};
+constexpr std::string_view kScores = "semantic_score.csv";
 
 /// The semantics section of a scenario, without a file around it.
 SemanticConfig config_of(const std::vector<std::string>& overrides) {
@@ -51,6 +59,77 @@ Input input_of(const fs::path& given) {
     }
   }
   return input;
+}
+
+/// Whether a folder is that of a flight that has come to its end: what it has flown through can be
+/// built again, truth.tum and all. A replay's world is not known.
+bool has_world(const fs::path& folder) {
+  std::error_code none;
+  if (!fs::is_directory(folder, none)) return false;
+  const auto summary = sim::read_summary(folder);
+  return summary && !summary->contains("replay");
+}
+
+/// O in W, as the flight's own score has it: by the best fit of the trajectories.
+Pose place_of_map(const fs::path& run, const worlds::World& world) {
+  const std::vector<sim::TimedPose> truth = sim::read_tum(run / "truth.tum");
+  const std::vector<sim::TimedPose> estimate = sim::read_tum(run / "estimate.tum");
+  if (truth.empty() || estimate.empty()) return sim::start_pose(world);
+  // truth.tum is in the O of the odometry's begin, when the vehicle stood where it starts.
+  const Pose X_WO = sim::start_pose(world) * truth.front().X.inverse();
+  std::vector<sim::PosePair> pairs;
+  for (std::size_t i = 0, j = 0; i < estimate.size(); ++i) {
+    while (j < truth.size() && truth[j].time_s < estimate[i].time_s) ++j;
+    if (j == truth.size()) break;
+    if (truth[j].time_s > estimate[i].time_s) continue;
+    pairs.push_back({from_seconds(truth[j].time_s), X_WO * truth[j].X, estimate[i].X});
+  }
+  return sim::align_map(pairs);
+}
+
+/// The map of a flight against the world that it was flown in; nothing, and a line that says so, if
+/// that cannot be built any more.
+std::optional<sim::SemanticScore> score_of_run(const fs::path& run, const SemanticMap& map,
+                                               const CloudFile& cloud) {
+  try {
+    const sim::Scenario scenario = sim::load_scenario(run / "resolved.yaml", {}, {});
+    const worlds::World world = scenario.build_world();
+    const Pose X_WC = place_of_map(run, world) * Pose{Mat3::Identity(), cloud.origin};
+    return sim::score_semantics(map, cloud.points, X_WC, world, scenario.config.scoring.semantic);
+  } catch (const ConfigError& problem) {
+    std::fprintf(stderr, "arex: not scored: %s\n", printable(problem.what()).c_str());
+    return std::nullopt;
+  }
+}
+
+std::string scores_csv(const sim::SemanticScore& score) {
+  std::string text = sim::csv_header(kScores);
+  for (std::size_t i = 0; i < sim::kScoredClasses.size(); ++i) {
+    const sim::ClassScore& of_class = score.classes[i];
+    text += kSemanticClassNames[static_cast<std::size_t>(sim::kScoredClasses[i])];
+    for (const double value : {of_class.precision, of_class.recall, of_class.f1,
+                               of_class.position_median_m, of_class.size_median_m}) {
+      text += "," + sim::csv_number(value, 4);
+    }
+    for (const std::size_t count :
+         {of_class.found, of_class.right, of_class.mapped, of_class.sized}) {
+      text += "," + std::to_string(count);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+void print_scores(const sim::SemanticScore& score) {
+  std::printf("  against the world: precision, recall, F1, position and size error (median, m)\n");
+  for (std::size_t i = 0; i < sim::kScoredClasses.size(); ++i) {
+    const sim::ClassScore& of_class = score.classes[i];
+    if (of_class.found == 0 && of_class.mapped == 0) continue;
+    const auto name = kSemanticClassNames[static_cast<std::size_t>(sim::kScoredClasses[i])];
+    std::printf("  %-8.*s %5.3f %5.3f %5.3f %6.3f %6.3f\n", static_cast<int>(name.size()),
+                name.data(), of_class.precision, of_class.recall, of_class.f1,
+                of_class.position_median_m, of_class.size_median_m);
+  }
 }
 
 void print_counts(const SemanticMap& map, const CloudFile& cloud, const fs::path& folder) {
@@ -87,18 +166,24 @@ int semantics(const SemanticsArguments& arguments) {
 
   const sim::OutputFolder folder(arguments.out);
   std::vector<sim::NamedFile> files{{"the cloud", input.cloud}};
-  for (const std::string_view name : kOutputs) {
+  std::vector<std::string_view> outputs(kOutputs.begin(), kOutputs.end());
+  const bool scored = has_world(arguments.input);
+  if (scored) outputs.push_back(kScores);
+  for (const std::string_view name : outputs) {
     files.push_back({std::string(name), folder.path() / name});
     check_writable(files.back().file);
   }
   sim::expect_different_files(files);
 
   SemanticMap map = map_of(cloud, path, config, input.cloud);
+  const auto score = scored ? score_of_run(arguments.input, map, cloud) : std::nullopt;
   map.origin = cloud.origin;
   write_semantic_pcd(folder.path() / "semantic.pcd", cloud, map);
   write_atomically(folder.path() / "objects.csv", objects_csv(map));
   write_atomically(folder.path() / "semantic.png", png_bytes(draw_semantic_map(map, path)));
+  if (score) write_atomically(folder.path() / kScores, scores_csv(*score));
   print_counts(map, cloud, folder.path());
+  if (score) print_scores(*score);
   return 0;
 }
 

@@ -416,6 +416,16 @@ std::vector<ColumnInfo> semantic_columns() {
       {"objects.csv", "canopy_diameter_m", "m", "of a circle with the area of a tree's crown"},
       {"objects.csv", "seen_fraction", "1", "share of a trunk's girth that shows bark"},
       {"objects.csv", "confidence", "", "0 to 1"},
+      {"semantic_score.csv", "class", "", "as objects.csv has it"},
+      {"semantic_score.csv", "precision", "1", "as the figures semantic.CLASS.*"},
+      {"semantic_score.csv", "recall", "1", "likewise"},
+      {"semantic_score.csv", "f1", "1", "likewise"},
+      {"semantic_score.csv", "position_median_m", "m", "likewise"},
+      {"semantic_score.csv", "size_median_m", "m", "likewise"},
+      {"semantic_score.csv", "found", "", "named by the map; less those that do not count"},
+      {"semantic_score.csv", "right", "", "of these, those that are there"},
+      {"semantic_score.csv", "mapped", "", "true ones that were mapped"},
+      {"semantic_score.csv", "sized", "", "right ones whose size was compared"},
   };
 }
 

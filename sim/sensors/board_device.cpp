@@ -13,20 +13,30 @@ constexpr Stamp kPowerPeriod = 5 * kNanosecondsPerTick;  // 200 Hz
 void BoardDevice::fire(const Moment& moment) {
   delivered_ = true;
   const Stamp now = moment.now;
-  const std::optional<ImuSample> raw = imu_.sample(moment.truth);
+  std::optional<ImuSample> raw = imu_.sample(moment.truth);
+  std::optional<ImuSample> output = imu_.output();
+  fields_.clear();
+  field_line_.pass(now, imu_.magnetometer(),
+                   [&](const MagnetometerSample& sample) { fields_.push_back(sample); });
+  if (!field_line_.sound()) {
+    // The nine axes hold what the magnetometer has delivered, not what it has measured.
+    if (!fields_.empty()) field_gauss_ = fields_.back().field_gauss;
+    raw->field_gauss = field_gauss_;
+    if (output) output->field_gauss = field_gauss_;
+  }
   raw_line_.pass(now, raw, [&](const ImuSample& sample) {
     autopilot_.add_imu(sample);
     add(sample);
   });
-  output_line_.pass(now, imu_.output(), [&](const ImuSample& sample) {
+  output_line_.pass(now, output, [&](const ImuSample& sample) {
     outlets_.software->add_imu(sample);
     add(sample);
     for (BagWriter* bag : outlets_.bags) bag->imu(sample);
   });
-  field_line_.pass(now, imu_.magnetometer(), [&](const MagnetometerSample& sample) {
+  for (const MagnetometerSample& sample : fields_) {
     autopilot_.add_magnetometer(sample);
     fingerprint_.add({sample.field_gauss.data(), 3});
-  });
+  }
   pressure_line_.pass(now, imu_.barometer(), [&](const BarometerSample& sample) {
     autopilot_.add_barometer(sample);
     fingerprint_.add({&sample.pressure_pa, 1});

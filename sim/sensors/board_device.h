@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "autopilot/autopilot.h"
 #include "sensors/device.h"
 #include "sensors/faulty_line.h"
@@ -32,6 +34,8 @@ class BoardDevice : public Device {
   FaultyLine<MagnetometerSample> field_line_;
   FaultyLine<BarometerSample> pressure_line_;
   FaultyLine<BatterySample> power_line_;
+  std::vector<MagnetometerSample> fields_;  ///< that arrive at this tick
+  Vec3 field_gauss_ = Vec3::Zero();         ///< the newest that has arrived
   Autopilot& autopilot_;
   Outlets& outlets_;
 };

@@ -13,16 +13,29 @@ namespace {
 /// Frames of a slanted wall at 10 Hz, and what the watch tells of them.
 class Camera {
  public:
-  void run(int frames, double noise_fraction, double valid_share) {
+  explicit Camera(std::uint64_t seed = 1) : noise_(seed, "camera") {}
+
+  /// @param glare chance of each block of 16 pixels to be drowned by light
+  /// @param sky share of the image, from the top, in which nothing is in range
+  void run(int frames, double noise_fraction, double valid_share, double glare = 0,
+           double sky = 0) {
     for (int i = 0; i < frames; ++i, now_ += kNanosecondsPerSecond / 10) {
       DepthImage image;
       image.stamp = now_;
       image.camera = {320, 240, 160, 160, 160, 120};
       image.depth_m.resize(320 * 240);
       for (std::size_t k = 0; k < image.depth_m.size(); ++k) {
-        const double slant = 1.5 + 0.004 * static_cast<double>(k % 320);
+        const double slant = 1.5 + 0.0015 * static_cast<double>(k % 320);
         const double depth = slant * (1 + (noise_fraction + 0.002) * noise_.normal());
-        image.depth_m[k] = noise_.uniform() < valid_share ? static_cast<float>(depth) : 0.0F;
+        const bool seen = noise_.uniform() < valid_share && static_cast<double>(k) >= sky * 76800;
+        image.depth_m[k] = seen ? static_cast<float>(depth) : 0.0F;
+      }
+      for (int block = 0; glare > 0 && block < 20 * 15; ++block) {
+        if (noise_.uniform() >= glare) continue;
+        for (int pixel = 0; pixel < 256; ++pixel) {
+          const int u = 16 * (block % 20) + pixel % 16, v = 16 * (block / 20) + pixel / 16;
+          image.depth_m[static_cast<std::size_t>(320 * v + u)] = 0;
+        }
       }
       watch_.add_depth(now_, image);
       for (const Event& event : watch_.update(now_, {})) told += event.detail + ";";
@@ -32,9 +45,23 @@ class Camera {
 
  private:
   HealthWatch watch_{HealthWatchConfig{}};
-  RandomStream noise_{1, "camera"};
+  RandomStream noise_;
   Stamp now_ = 0;
 };
+
+TEST(HealthWatch, TellsACameraThatIsBlindedInPartFromOneThatSeesLess) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Camera camera(seed);
+    camera.run(30, 0, 0.97);
+    camera.run(30, 0, 0.97, 0, 0.4);  // half of the wall ends
+    camera.run(30, 0, 0.93);          // leaves with gaps
+    EXPECT_EQ(camera.told, "") << seed;
+    camera.run(20, 0, 0.97, 0.2);
+    EXPECT_EQ(camera.told, "depth blinded in part;") << seed;
+    camera.run(20, 0, 0.97);
+    EXPECT_EQ(camera.told, "depth blinded in part;depth not blinded in part any more;") << seed;
+  }
+}
 
 TEST(HealthWatch, TellsABlindedCameraAndANoisyOne) {
   Camera camera;
@@ -47,6 +74,86 @@ TEST(HealthWatch, TellsABlindedCameraAndANoisyOne) {
   camera.told.clear();
   camera.run(20, 0.05, 0.9);
   EXPECT_EQ(camera.told, "depth noisy;");
+}
+
+/// Nine axes at 200 Hz, of which the field is what a magnetometer of `rate_hz` gave last.
+class NineAxes {
+ public:
+  NineAxes(std::uint64_t seed, int rate_hz) : noise_(seed, "magnetometer"), every_(200 / rate_hz) {}
+
+  struct Doing {
+    double turns_radps = 0;
+    bool in_air = true;
+    bool hangs = false;      ///< the magnetometer, or it is silent
+    double noise_gauss = 0;  ///< beyond its own
+    double passes_mps = 0;   ///< a steel pillar, half a metre away
+  };
+  void run(double seconds, const Doing& doing) {
+    const int first = tick_;
+    for (; tick_ < first + static_cast<int>(200 * seconds); ++tick_) {
+      const double t = (tick_ - first) / 200.0;
+      yaw_ += doing.turns_radps / 200;
+      if (tick_ % every_ == 0 && !doing.hangs) {
+        // The pillar's: a dipole with half of the Earth's field at 0.5 m.
+        const Vec3 away(doing.passes_mps * (t - 0.5 * seconds), 0.5, 0);
+        const double r = away.norm();
+        const Vec3 steel =
+            doing.passes_mps > 0
+                ? Vec3(0.2 * std::pow(0.5 / r, 3) * (3 * away.y() / (r * r) * away - Vec3(0, 1, 0)))
+                : Vec3(Vec3::Zero());
+        const Vec3 earth(0.375 * std::sin(yaw_), 0.375 * std::cos(yaw_), -0.253);
+        field_ = earth + steel + (0.0057 + doing.noise_gauss) * noise_.normal3();
+      }
+      watch_.add(field_);
+      if (auto event = watch_.update(doing.in_air)) told += *event + ";";
+    }
+  }
+  std::string told;
+
+ private:
+  FieldWatch watch_{HealthWatchConfig{}.field_step_gauss};
+  RandomStream noise_;
+  int every_;
+  int tick_ = 0;
+  double yaw_ = 0;
+  Vec3 field_ = Vec3::Zero();
+};
+
+TEST(FieldWatch, NeitherTurnsNorSteelNorStandingAreAFault) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const int rate_hz : {200, 100, 50}) {
+      NineAxes axes(seed, rate_hz);
+      axes.run(2, {.in_air = false});
+      axes.run(5, {.turns_radps = 3.5});  // the vehicle's limit
+      axes.run(4, {.passes_mps = 2});
+      EXPECT_EQ(axes.told, "") << rate_hz << " Hz, seed " << seed;
+    }
+  }
+}
+
+TEST(FieldWatch, TellsAMagnetometerThatHangsAndANoisyOne) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const int rate_hz : {200, 100, 50}) {
+      NineAxes axes(seed, rate_hz);
+      axes.run(2, {.in_air = false});
+      axes.run(2, {});
+      axes.run(1, {.hangs = true});
+      EXPECT_EQ(axes.told, "imu's magnetometer stuck;") << rate_hz << " Hz, seed " << seed;
+      axes.run(1, {});
+      EXPECT_EQ(axes.told, "imu's magnetometer stuck;imu's magnetometer sound again;");
+      axes.told.clear();
+      axes.run(2, {.noise_gauss = 0.2});
+      EXPECT_EQ(axes.told, "imu's magnetometer noisy;") << rate_hz << " Hz, seed " << seed;
+    }
+  }
+}
+
+TEST(FieldWatch, AnImuWithoutAMagnetometerHasNoneThatHangs) {
+  FieldWatch watch(HealthWatchConfig{}.field_step_gauss);
+  for (int i = 0; i < 2000; ++i) {
+    watch.add(Vec3::Zero());
+    EXPECT_FALSE(watch.update(true));
+  }
 }
 
 TEST(HealthWatch, AutopilotAndOdometryThatContradictEachOtherAreToldIfItLasts) {

@@ -90,6 +90,42 @@ TEST(FailureStories, AWornCellIsTold) {
   EXPECT_TRUE(flown.told("vehicle_fault,battery cell weak")) << flown.events;
 }
 
+TEST(FailureStories, AVehicleWithANoisyBarometerNoticesThatItHasLanded) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Flown flown = fly(kBare, {"faults=[{device: barometer, kind: noisy, from_s: 8}]"}, seed);
+    EXPECT_EQ(flown.result.outcome, Outcome::kSucceeded) << flown.result.reason;
+    EXPECT_TRUE(flown.told("sensor_fault,barometer noisy")) << flown.events;
+  }
+}
+
+// One that is silent leaves its last reading in the nine axes.
+TEST(FailureStories, AMagnetometersFaultsAreToldByAutopilotAndStack) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (const auto& [kind, in_nine_axes] :
+         {std::pair("stuck", "stuck"), {"silent", "stuck"}, {"noisy", "noisy"}}) {
+      const Flown flown = fly(
+          kBare, {std::string("faults=[{device: magnetometer, from_s: 8, kind: ") + kind + "}]"},
+          seed);
+      EXPECT_EQ(flown.result.outcome, Outcome::kSucceeded) << flown.result.reason;
+      EXPECT_TRUE(flown.told(std::string("sensor_fault,magnetometer ") + kind)) << flown.events;
+      EXPECT_TRUE(flown.told(std::string("sensor_fault,imu's magnetometer ") + in_nine_axes))
+          << kind << ": " << flown.events;
+    }
+  }
+}
+
+TEST(FailureStories, ACameraThatIsBlindedByAFifthIsTold) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const auto told = [&](const std::vector<std::string>& more) {
+      std::vector<std::string> overrides{"mapping.enabled=true", "mapping.use_depth=true"};
+      overrides.insert(overrides.end(), more.begin(), more.end());
+      return fly(kWood, overrides, seed).told("sensor_fault,depth blinded in part");
+    };
+    EXPECT_FALSE(told({})) << seed;
+    EXPECT_TRUE(told({"faults=[{device: depth, kind: blinded, share: 0.2, from_s: 8.5}]"})) << seed;
+  }
+}
+
 TEST(FailureStories, ASilentLidarLands) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Flown flown = fly(kWood, {"faults=[{device: lidar, kind: silent, from_s: 8.5}]"}, seed);

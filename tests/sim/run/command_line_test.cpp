@@ -277,6 +277,43 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
   EXPECT_EQ(summary_again["sensor_hash"], summary["sensor_hash"]);
 }
 
+// The world is built again, and the score is the flight's own.
+TEST(CommandLine, ScoresTheSemanticMapOfARunAgainstItsWorld) {
+  const TemporaryFolder folder;
+  const Result flown =
+      run({"run", AREX_SOURCE_DIR "/scenarios/forest_small.yaml", "--set", "mission.max_time_s=12",
+           "--set", "depth.rate_hz=1", "--set", "scoring.tour.enabled=false", "--set",
+           "semantics.enabled=true", "--seed", "7", "--quiet", "--no-report", "--out",
+           (folder / "run").string()});
+  EXPECT_EQ(flown.exit_code, 1) << flown.err;  // timed out
+  const auto expected = nlohmann::json::parse(read_text(folder / "run/summary.json"))["semantic"];
+  ASSERT_TRUE(expected["trunk"]["f1"].is_number());
+  const Result map =
+      run({"semantics", (folder / "run").string(), "--out", (folder / "map").string()});
+  EXPECT_EQ(map.exit_code, 0) << map.err;
+  EXPECT_NE(map.out.find("against the world"), std::string::npos) << map.out;
+  std::istringstream lines(read_text(folder / "map/semantic_score.csv"));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line.substr(0, 34), "class,precision,recall,f1,position");
+  std::getline(lines, line);
+  double precision = 0, recall = 0, f1 = 0, position = 0;
+  ASSERT_EQ(std::sscanf(line.c_str(), "trunk,%lf,%lf,%lf,%lf", &precision, &recall, &f1, &position),
+            4)
+      << line;
+  EXPECT_NEAR(precision, expected["trunk"]["precision"].get<double>(), 1e-4);
+  EXPECT_NEAR(recall, expected["trunk"]["recall"].get<double>(), 1e-4);
+  EXPECT_NEAR(f1, expected["trunk"]["f1"].get<double>(), 1e-4);
+  EXPECT_NEAR(position, expected["trunk"]["position_median_m"].get<double>(), 1e-3);
+
+  // A cloud alone has no world, and neither has a folder whose flight is not over.
+  std::filesystem::remove(folder / "run/summary.json");
+  const Result unfinished =
+      run({"semantics", (folder / "run").string(), "--out", (folder / "other").string()});
+  EXPECT_EQ(unfinished.exit_code, 0) << unfinished.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "other/semantic_score.csv"));
+}
+
 TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {
   const TemporaryFolder folder;
   const std::string junit = (folder / "junit.xml").string();

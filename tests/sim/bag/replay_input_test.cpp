@@ -224,6 +224,9 @@ TEST(ReplayInput, RefusesTopicsThatDoNotFit) {
   options.lidar_topic = "/os/pointz";
   EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
             std::string::npos);
+  options.lidar_topic = "/os/imus";  // nearer to the IMU's, which would not do
+  EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
+            std::string::npos);
   options.lidar_topic = "/os/imu";
   EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("expected PointCloud2"),
             std::string::npos);

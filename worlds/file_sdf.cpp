@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <sdf/sdf.hh>
@@ -60,6 +62,83 @@ class Resolver {
   std::vector<fs::path> folders_;
 };
 
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// What stands between an opening tag, whose attributes may be any, and its closing one, each time.
+std::vector<std::string_view> elements(std::string_view text, const std::string& name) {
+  std::vector<std::string_view> found;
+  const std::string opening = "<" + name, closing = "</" + name + ">";
+  for (std::size_t at = 0; (at = text.find(opening, at)) != std::string_view::npos;) {
+    const std::size_t begin = text.find('>', at);
+    const std::size_t end = text.find(closing, at);
+    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) break;
+    found.push_back(text.substr(begin + 1, end - begin - 1));
+    at = end;
+  }
+  return found;
+}
+
+/// The models that a file includes, as it names them.
+std::vector<std::string> includes_of(const fs::path& file) {
+  std::string text = text_of(file);
+  for (std::size_t begin = 0; (begin = text.find("<!--", begin)) != std::string::npos;) {
+    const std::size_t end = text.find("-->", begin);
+    text.erase(begin, end == std::string::npos ? end : end + 3 - begin);
+  }
+  std::vector<std::string> uris;
+  for (const std::string_view include : elements(text, "include")) {
+    for (const std::string_view uri : elements(include, "uri")) {
+      const std::size_t first = uri.find_first_not_of(" \t\r\n");
+      if (first == std::string_view::npos) continue;
+      uris.emplace_back(uri.substr(first, uri.find_last_not_of(" \t\r\n") + 1 - first));
+    }
+  }
+  return uris;
+}
+
+/// libsdformat follows includes for ever where they lead in a circle.
+class IncludeCheck {
+ public:
+  IncludeCheck(const Resolver& resolver, fs::path beside)
+      : resolver_(resolver), beside_(std::move(beside)) {}
+
+  /// @param name of the file, as who includes it has it
+  void expect_no_circle(const fs::path& file, const std::string& name) {
+    std::error_code none;
+    const std::string key = fs::weakly_canonical(file, none).string();
+    const auto same = [&](const Step& step) { return step.key == key; };
+    if (const auto begin = std::find_if(way_.begin(), way_.end(), same); begin != way_.end()) {
+      std::string circle;
+      for (auto step = begin; step != way_.end(); ++step) {
+        circle += shortened(step->name, 100) + " includes ";
+      }
+      throw std::runtime_error("never ends: " + circle + shortened(begin->name, 100));
+    }
+    if (way_.size() > kDeepest) throw std::runtime_error("nests its includes too deeply");
+    if (!sound_.insert(key).second) return;
+    way_.push_back({key, name});
+    for (const std::string& uri : includes_of(file)) {
+      fs::path included = resolver_.find(uri, beside_);
+      if (fs::is_directory(included, none)) included = sdf::getModelFilePath(included.string());
+      if (fs::is_regular_file(included, none)) expect_no_circle(included, uri);
+    }
+    way_.pop_back();
+  }
+
+ private:
+  struct Step {
+    std::string key, name;
+  };
+  static constexpr std::size_t kDeepest = 50;
+  const Resolver& resolver_;
+  fs::path beside_;
+  std::vector<Step> way_;        ///< from the first file to the one being read
+  std::set<std::string> sound_;  ///< and those of the way; they need no second look
+};
+
 class SdfReader {
  public:
   SdfReader(fs::path file, const std::vector<fs::path>& model_paths)
@@ -67,6 +146,7 @@ class SdfReader {
 
   FileScene read() {
     sdf::Console::Instance()->SetQuiet(true);
+    IncludeCheck(resolver_, file_).expect_no_circle(file_, file_.filename().string());
     const auto find = [this](const std::string& uri) {
       std::string path = resolver_.find(uri, file_).string();
       if (path.empty()) unfound_.insert(uri);
@@ -93,8 +173,11 @@ class SdfReader {
     } else if (root.Model() != nullptr) {
       add(*root.Model(), pose_in_parent(*root.Model()), "", 0);
     } else {
-      throw std::runtime_error(complaints_.empty() ? "holds neither a world nor a model"
-                                                   : complaints_.front());
+      // Of a file that is no XML, or without <sdf>, libsdformat says that it cannot be read.
+      const bool is_other =
+          complaints_.empty() || complaints_.front().starts_with("Unable to read file");
+      throw std::runtime_error(is_other ? "holds neither a world nor a model, or is no sound SDF"
+                                        : complaints_.front());
     }
     note_missing();
     return std::move(scene_);

@@ -10,6 +10,7 @@
 
 #include "config/config.h"
 #include "math/so3.h"
+#include "worlds/file_ground.h"
 #include "worlds/triangle.h"
 
 namespace arex::worlds {
@@ -17,122 +18,28 @@ namespace {
 
 constexpr double kStartResolution = 0.2;  // m; conservative cells make every gap narrower by this
 constexpr double kMostStartCells = 4e7;   // beyond, the cells grow
-constexpr double kHover = 0.8;            // where room is looked for, above the ground, m
-constexpr double kWanted = 0.7;           // room there that is as good as more, m
-constexpr double kOneFloor = 0.01;        // between levels that are the same, m
-constexpr double kOffRim = 2.0;           // from the world's rim to an origin that is meant, m
-constexpr double kLattice = 0.4;          // between the places that are tried, m
-constexpr double kFoot = 0.1;             // from the middle to a leg, along x and y, m
-constexpr double kUneven = 0.05;          // between the ground's heights under middle and legs, m
-constexpr double kOnGround = 0.3;         // a given height this far from the ground means it, m
-constexpr double kStandable = 0.7;        // cosine of the steepest ground to stand on
-constexpr double kFairShare = 0.1;        // of the free space that a start is to give access to
-constexpr double kLeastReach = 1.0;       // m^2 that can be reached, seen from above
-
-using Corners = std::array<Vec3, 3>;
-
-Corners corners_of(const World& world, std::size_t t) {
-  Corners v;
-  for (std::size_t i = 0; i < 3; ++i) {
-    v[i] = world.mesh.vertices[world.mesh.triangles[t][i]].cast<double>();
-  }
-  return v;
-}
-
-/// The heights of what is level enough to stand on, above and below each other.
-class Ground {
- public:
-  explicit Ground(const World& world) : world_(world), low_(world.bounds.low.head<2>()) {
-    const Vec2 size = (world.bounds.high - world.bounds.low).head<2>();
-    cell_m_ = std::max(1.0, std::sqrt(size.prod() / 1e6));
-    columns_ = std::max(1, static_cast<int>(std::ceil(size.x() / cell_m_)));
-    rows_ = std::max(1, static_cast<int>(std::ceil(size.y() / cell_m_)));
-    members_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
-    for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
-      if (world.class_of_triangle(t) == SurfaceClass::kLeaf) continue;
-      const Corners v = corners_of(world, t);
-      if (std::abs((v[1] - v[0]).cross(v[2] - v[0]).normalized().z()) < kStandable) continue;
-      add(v, static_cast<std::uint32_t>(t));
-    }
-  }
-
-  /// Those of the heights that nothing level is just above: of two layers of one floor the upper,
-  /// of a slab its top.
-  [[nodiscard]] std::vector<double> floors(const Vec2& p) const {
-    const std::vector<double> all = heights(p);
-    std::vector<double> open;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const auto above = std::find_if(all.begin() + static_cast<std::ptrdiff_t>(i), all.end(),
-                                      [&](double z) { return z > all[i] + kOneFloor; });
-      if (above == all.end() || *above >= all[i] + kHover) open.push_back(all[i]);
-    }
-    return open;
-  }
-
-  /// Ascending, in m.
-  [[nodiscard]] std::vector<double> heights(const Vec2& p) const {
-    std::vector<double> found;
-    const int x = column(p.x()), y = row(p.y());
-    if (x < 0 || y < 0 || x >= columns_ || y >= rows_) return found;
-    for (const std::uint32_t t : members_[index(x, y)]) {
-      const Corners v = corners_of(world_, t);
-      if (const double z = height_in(v, p); std::isfinite(z)) found.push_back(z);
-    }
-    std::sort(found.begin(), found.end());
-    return found;
-  }
-
- private:
-  [[nodiscard]] int column(double x) const {
-    return static_cast<int>(std::floor((x - low_.x()) / cell_m_));
-  }
-  [[nodiscard]] int row(double y) const {
-    return static_cast<int>(std::floor((y - low_.y()) / cell_m_));
-  }
-  [[nodiscard]] std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(x);
-  }
-
-  void add(const Corners& v, std::uint32_t t) {
-    const Vec3 low = v[0].cwiseMin(v[1]).cwiseMin(v[2]), high = v[0].cwiseMax(v[1]).cwiseMax(v[2]);
-    for (int y = std::max(0, row(low.y())); y <= std::min(rows_ - 1, row(high.y())); ++y) {
-      for (int x = std::max(0, column(low.x())); x <= std::min(columns_ - 1, column(high.x()));
-           ++x) {
-        members_[index(x, y)].push_back(t);
-      }
-    }
-  }
-
-  /// Not a number: the column through p misses the triangle.
-  static double height_in(const Corners& v, const Vec2& p) {
-    const Vec3 normal = (v[1] - v[0]).cross(v[2] - v[0]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vec2 a = v[i].head<2>(), edge = v[(i + 1) % 3].head<2>() - a;
-      const double side = edge.x() * (p.y() - a.y()) - edge.y() * (p.x() - a.x());
-      if (side * normal.z() < 0) return std::nan("");
-    }
-    return v[0].z() - normal.head<2>().dot(p - v[0].head<2>()) / normal.z();
-  }
-
-  const World& world_;
-  Vec2 low_;
-  double cell_m_ = 1;
-  int columns_ = 0, rows_ = 0;
-  std::vector<std::vector<std::uint32_t>> members_;
-};
+constexpr double kHover = Ground::kHeadroom;  // where room is looked for, above the ground, m
+constexpr double kWanted = 0.7;               // room there that is as good as more, m
+constexpr double kOffRim = 2.0;               // from the world's rim to an origin that is meant, m
+constexpr double kLattice = 0.4;              // between the places that are tried, m
+constexpr double kFoot = 0.1;                 // from the middle to a leg, along x and y, m
+constexpr double kUneven = 0.05;     // between the ground's heights under middle and legs, m
+constexpr double kOnGround = 0.3;    // a given height this far from the ground means it, m
+constexpr double kFairShare = 0.1;   // of the free space that a start is to give access to
+constexpr double kLeastReach = 1.0;  // m^2 that can be reached, seen from above
 
 /// Distance from a point to the nearest triangle that is not the ground it is above, at most 2 m.
 double room_at(const World& world, const Vec3& p, double ground) {
   double room = 2;
   for (std::size_t t = 0; t < world.mesh.triangles.size(); ++t) {
     if (world.class_of_triangle(t) == SurfaceClass::kLeaf) continue;
-    const Corners v = corners_of(world, t);
+    const std::array<Vec3, 3> v = corners_of(world, t);
     const Vec3 low = v[0].cwiseMin(v[1]).cwiseMin(v[2]), high = v[0].cwiseMax(v[1]).cwiseMax(v[2]);
     if (((low - p).array() > room).any() || ((p - high).array() > room).any()) continue;
     const Vec3 nearest = nearest_on_triangle(p, v[0], v[1], v[2]);
     const Vec3 normal = (v[1] - v[0]).cross(v[2] - v[0]).normalized();
-    const bool is_ground = std::abs(normal.z()) >= kStandable && nearest.z() < ground + kOnGround;
+    const bool is_ground =
+        std::abs(normal.z()) >= Ground::kStandable && nearest.z() < ground + kOnGround;
     if (!is_ground) room = std::min(room, (nearest - p).norm());
   }
   return room;

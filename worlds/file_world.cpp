@@ -265,6 +265,12 @@ void add_primitive(MeshBuilder& builder, const FilePrimitive& primitive, std::ui
 
 void expect_fair_extent(const Bounds& bounds) {
   const Vec3 size = bounds.high - bounds.low;
+  if (size.maxCoeff() > kLargest) {
+    throw ConfigError(
+        fmt::format("is {:.4g} x {:.4g} x {:.4g} m large, expected at most {:.0f}: has it other "
+                    "units? See file.scale",
+                    size.x(), size.y(), size.z(), kLargest));
+  }
   if (bounds.low.cwiseAbs().maxCoeff() > kFarthest ||
       bounds.high.cwiseAbs().maxCoeff() > kFarthest) {
     throw ConfigError(fmt::format(
@@ -272,12 +278,6 @@ void expect_fair_extent(const Bounds& bounds) {
         "origin: see file.offset_m",
         0.5 * (bounds.low.x() + bounds.high.x()), 0.5 * (bounds.low.y() + bounds.high.y()),
         0.5 * (bounds.low.z() + bounds.high.z()), kFarthest));
-  }
-  if (size.maxCoeff() > kLargest) {
-    throw ConfigError(
-        fmt::format("is {:.4g} x {:.4g} x {:.4g} m large, expected at most {:.0f}: has it other "
-                    "units? See file.scale",
-                    size.x(), size.y(), size.z(), kLargest));
   }
 }
 

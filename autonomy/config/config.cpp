@@ -265,9 +265,10 @@ void apply_override(ConfigNode& root, const std::string& assignment) {
   }
   const std::string key = assignment.substr(0, equals);
   const std::string where = std::string(kOverride) + " " + shortened(key);
-  set_value(root, key, where,
-            config_detail::read_yaml(assignment.substr(equals + 1), where,
-                                     config_detail::Positions::kName));
+  ConfigNode value = config_detail::read_yaml(assignment.substr(equals + 1), where,
+                                              config_detail::Positions::kName);
+  if (value.where.empty()) value.where = where;  // where nothing stands behind the sign
+  set_value(root, key, where, value);
 }
 
 std::string last_given(const ConfigNode& section) {

@@ -10,6 +10,7 @@
 #include "run/file_io.h"
 #include "run/scenario.h"
 #include "worlds/export.h"
+#include "worlds/file_ground.h"
 #include "worlds/recipes.h"
 
 namespace arex::app {
@@ -63,9 +64,9 @@ worlds::FileWorld build(const ConfigNode& root, const RecipeConfig& recipe, bool
 }
 
 /// The whole world from above, a little from the south, and what is above the start's storey cut
-/// away; a mast marks the start.
+/// away, however it slopes; a mast marks the start.
 void draw_overview(const worlds::World& world, const std::filesystem::path& file) {
-  constexpr double kStorey = 2.2;       // m above the start
+  constexpr double kStorey = 2.2;       // m above its ground
   constexpr double kMast = 1.0 / 60.0;  // of the world's extent
   const sim::PictureOptions standard;
   const Vec3 size = world.bounds.high - world.bounds.low;
@@ -76,7 +77,7 @@ void draw_overview(const worlds::World& world, const std::filesystem::path& file
   middle.z() = world.X_WS.p.z();
   sim::PictureOptions options;
   options.visibility_m = 20 * height;
-  options.cut_above_m = world.X_WS.p.z() + kStorey;
+  options.light = sim::PictureOptions::Light::kSun;
   sim::PictureOverlay overlay;
   const double mast = kMast * std::max(size.x(), size.y());
   const Vec3 p = world.X_WS.p;
@@ -86,7 +87,8 @@ void draw_overview(const worlds::World& world, const std::filesystem::path& file
        {0.95, 0.25, 0.1},
        mast / 8});
   const Pose X_WC = sim::look_at(middle + Vec3(0, -0.35 * height, height), middle);
-  sim::save_png(sim::render_picture(world, X_WC, options, overlay), file);
+  const worlds::World shown = worlds::cut_above(world, worlds::storey_of(world), kStorey);
+  sim::save_png(sim::render_picture(shown, X_WC, options, overlay), file);
 }
 
 void check_size(const ConfigNode& root, const worlds::World& world, double resolution_m) {

@@ -28,8 +28,11 @@ bool ReplayInput::StampChecks::accept(Stamp stamp) {
     ++counts.unordered;
     return false;
   }
-  if (last && period > 0 && 2 * (stamp - *last) > 3 * period) {
-    counts.missing += static_cast<std::uint64_t>((stamp - *last + period / 2) / period - 1);
+  // Stamps of a damaged recording may lie so far apart that no multiple of it is a number.
+  const Stamp gap = last ? stamp - *last : 0;
+  if (period > 0 && gap - period > period / 2) {
+    const bool rounds_up = gap % period >= period - period / 2;
+    counts.missing += static_cast<std::uint64_t>(gap / period - (rounds_up ? 0 : 1));
   }
   last = stamp;
   ++counts.used;

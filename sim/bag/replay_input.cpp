@@ -32,11 +32,11 @@ std::size_t topic_named(const Recording& recording, const std::string& name,
       throw ConfigError(option + ": " + name + " has messages of type " +
                         printable(shortened(topic.type)) + ", expected " + expected);
     }
-    names.push_back(topic.name);
+    if (fits(topic)) names.push_back(topic.name);
   }
-  throw ConfigError(
-      option + ": the recording has no topic '" + shortened(name) + "'" +
-      (names.empty() ? "" : "; did you mean '" + printable(nearest(name, names)) + "'?"));
+  throw ConfigError(option + ": the recording has no topic '" + shortened(name) + "'" +
+                    (names.empty() ? " and none of type " + expected
+                                   : "; did you mean '" + printable(nearest(name, names)) + "'?"));
 }
 
 std::size_t busiest_topic(const Recording& recording, const std::filesystem::path& file,

@@ -17,7 +17,7 @@ namespace {
 constexpr int kSupersampling = 2;      // along each axis
 constexpr GLsizei kShadowSize = 4096;  // texels a side
 constexpr double kNear = 0.05;         // m
-constexpr double kFar = 500;           // m
+constexpr double kFar = 2.5;           // visibilities: the haze leaves 8 % of what is there
 constexpr float kNoCut = 1e6F;         // m, above everything
 const Vec3 kToSun = Vec3(-0.42, 0.38, 0.82).normalized();
 
@@ -280,7 +280,7 @@ void PictureRenderer::Impl::draw_world(const Pose& X_WC, const PictureOptions& o
   if (drawn) return;
   device->world_view.reset();
   const float cut_above = cut_height(options);
-  auto visible = visible_chunks(chunks, ViewVolume(camera, X_WC, kFar));
+  auto visible = visible_chunks(chunks, ViewVolume(camera, X_WC, kFar * options.visibility_m));
   std::erase_if(visible, [&](std::uint32_t i) { return chunks[i].bounds.min().z() > cut_above; });
   const bool headlight =
       options.light == PictureOptions::Light::kSunAndHeadlight ||

@@ -29,5 +29,7 @@ void damage_files(const Corpus& corpus, const std::filesystem::path& folder, Ran
 /// Writes a mesh, Gazebo world, octree or cloud and damages it. @return the file
 std::filesystem::path write_damaged_world(const std::filesystem::path& folder,
                                           RandomStream& random);
+/// The same, and reads it as `arex world` does.
+void read_damaged_world(const std::filesystem::path& folder, RandomStream& random);
 
 }  // namespace arex::test

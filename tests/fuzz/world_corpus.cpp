@@ -6,6 +6,7 @@
 #include "fuzz/mutation.h"
 #include "room.h"
 #include "support/temporary_folder.h"
+#include "worlds/file_world.h"
 
 namespace arex::test {
 namespace {
@@ -82,6 +83,13 @@ std::filesystem::path write_damaged_world(const std::filesystem::path& folder,
   const std::string name = any_name(world_files(), random);
   write_text(folder / name, damage_bytes(world_files().at(name), others, random));
   return folder / name;
+}
+
+void read_damaged_world(const std::filesystem::path& folder, RandomStream& random) {
+  worlds::FileRecipe recipe;
+  recipe.path = write_damaged_world(folder, random).string();
+  constexpr double kVehicleRadius = 0.29;  // m
+  static_cast<void>(worlds::load_file_world(recipe, kVehicleRadius));
 }
 
 }  // namespace arex::test

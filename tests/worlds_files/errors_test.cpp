@@ -34,6 +34,7 @@ TEST_F(FileErrors, WhatHoldsNothing) {
               "y\nproperty float z\nend_header\n"),
          "no faces");
   expect(said("x.sdf", "<sdf version='1.6'><world name='w'/></sdf>"), "no faces");
+  expect(said("y.world", "<html></html>"), "holds neither a world nor a model");
   EXPECT_NE(said("x.obj", "# nothing\n"), "");
   EXPECT_NE(said("x.stl", "solid\nendsolid\n"), "");
   expect(said("y.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), "holds no faces");
@@ -68,6 +69,8 @@ TEST_F(FileErrors, UnitsThatCannotBe) {
   const auto inches = test::mapped(test::room(), [](const Vec3& p) { return 1000 * p; });
   expect(said("x.stl", test::stl_binary(inches)), "6000 x 5000");
   expect(said("y.stl", test::stl_binary(inches)), "file.scale");
+  const auto absurd = test::mapped(test::room(), [](const Vec3& p) { return 1e6 * p; });
+  expect(said("w.stl", test::stl_binary(absurd)), "6e+06 x 5e+06");
   const auto utm =
       test::mapped(test::room(), [](const Vec3& p) -> Vec3 { return p + Vec3(4e5, 5e6, 100); });
   expect(said("z.ply", test::ply(utm, test::PlyKind::kAscii)), "file.offset_m");

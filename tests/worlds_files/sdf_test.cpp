@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "config/config.h"
 #include "math/so3.h"
 #include "room.h"
 #include "support/temporary_folder.h"
@@ -182,6 +183,45 @@ TEST(Sdf, ASavedStateMovesItsModels) {
   const auto boxes = shapes_of(test::load(folder / "x.world"), Kind::kBox);
   ASSERT_EQ(boxes.size(), 1U);
   EXPECT_TRUE(boxes[0].X_WS.p.isApprox(Vec3(-4, 2, 0.5)));
+}
+
+// libsdformat follows such includes until its stack ends.
+TEST(Sdf, ModelsThatIncludeEachOtherInACircleAreNamed) {
+  const TemporaryFolder folder;
+  const auto include = [](const std::string& uri) {
+    return "<include><uri>" + uri + "</uri></include>";
+  };
+  const auto write_model = [&](const std::string& name, const std::string& content) {
+    test::write_file(folder / ("models/" + name + "/model.config"),
+                     "<model><name>" + name + "</name><sdf version='1.6'>model.sdf</sdf></model>");
+    test::write_file(folder / ("models/" + name + "/model.sdf"),
+                     "<sdf version='1.6'><model name='" + name + "'><static>1</static>" + content +
+                         "<link name='l'/></model></sdf>");
+  };
+  const auto complaint = [&](const std::string& model) -> std::string {
+    test::write_file(folder / "x.world", world_of(kPlane + include(model)));
+    try {
+      test::load(folder / "x.world");
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  write_model("snake", include("model://snake"));
+  EXPECT_NE(complaint("model://snake").find("model://snake includes model://snake"),
+            std::string::npos)
+      << complaint("model://snake");
+  write_model("hen", include("model://nest"));
+  write_model("nest", include(" model://egg\n") + include("model://egg"));
+  write_model("egg", "<!-- " + include("model://egg") + " -->" + include("model://hen"));
+  EXPECT_NE(
+      complaint("model://hen")
+          .find("model://hen includes model://nest includes model://egg includes model://hen"),
+      std::string::npos)
+      << complaint("model://hen");
+  // What is only written beside, or included twice, is no circle.
+  write_model("egg", "<!-- " + include("model://hen") + " -->");
+  EXPECT_EQ(complaint("model://hen"), "");
 }
 
 TEST(Sdf, CollisionsStandInForMissingVisuals) {

@@ -62,6 +62,11 @@ TEST(Overrides, ARuleOverSectionsNamesTheKeyNotTheSection) {
             "a.yaml:5: out of range: expected one.steps <= two.steps + 5");
 }
 
+TEST(Overrides, OfNothingNameTheirKey) {
+  EXPECT_EQ(refusal_of("seed: 5\n", {"one.steps="}).find("--set one.steps: "), 0U)
+      << refusal_of("seed: 5\n", {"one.steps="});
+}
+
 TEST(Overrides, GoIntoSectionsOnly) {
   EXPECT_EQ(refusal_of("one: 5\n", {"one.steps=2"}),
             "--set one.steps: goes into '5' of a.yaml:1, expected a map of keys there");

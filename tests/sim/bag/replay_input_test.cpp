@@ -65,6 +65,13 @@ class Foreign {
     message.u32(1).header(kDay, 0, parent).text(child).f64(x).zeros(5 * 8).f64(1);
     write(transforms_, 0, message);
   }
+  /// Stamped with a second of the clock's own.
+  void imu_of_second(std::uint32_t second, std::uint32_t recorded) {
+    Packed message;
+    message.header(second, 0, imu_frame_).zeros(13 * 8);
+    message.f64(0).f64(0).f64(0.5).zeros(9 * 8).f64(0).f64(0).f64(9.8).zeros(9 * 8);
+    write(imu_, recorded, message);
+  }
   void broken_imu(std::uint32_t recorded) { write(imu_, recorded, Packed().u32(3)); }
   void close() { bag_.close(); }
 
@@ -181,6 +188,20 @@ TEST(ReplayInput, CountsWhatIsWrongAndGoesOn) {
   EXPECT_FALSE(input.X_BL() == std::nullopt);
 }
 
+// Thrice the usual step between these stamps is no number of nanoseconds.
+TEST(ReplayInput, CountsNothingMissingBetweenStampsOfAbsurdClocks) {
+  const TemporaryFolder folder;
+  Foreign bag(folder / "a.bag");
+  for (std::uint32_t i = 0; i < 10; ++i)
+    bag.imu_of_second(i % 2 == 0 ? 1 + i : 4'200'000'000 + i, i);
+  bag.scan(0, 95);
+  bag.close();
+  ReplayInput input(folder / "a.bag", {});
+  while (input.next()) {
+  }
+  EXPECT_EQ(input.imu_counts().missing, 0U);
+}
+
 TEST(ReplayInput, TakesTheLeastDelayForNoneWhereARecorderHadAnotherClock) {
   const TemporaryFolder folder;
   Foreign bag(folder / "a.bag");
@@ -222,6 +243,9 @@ TEST(ReplayInput, RefusesTopicsThatDoNotFit) {
   bag.close();
   ReplayOptions options;
   options.lidar_topic = "/os/pointz";
+  EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
+            std::string::npos);
+  options.lidar_topic = "/os/imus";  // nearer to the IMU's, which would not do
   EXPECT_NE(test::refusal_of(folder / "a.bag", options).find("did you mean '/os/points'?"),
             std::string::npos);
   options.lidar_topic = "/os/imu";

@@ -86,6 +86,22 @@ TEST(Picture, LooksUnderACeilingThatIsCutAway) {
   EXPECT_EQ(renderer.render(above, small_picture()).rgb, closed.rgb);
 }
 
+// A mine of 330 m is seen whole from 520 m above.
+TEST(Picture, ShowsAWholeWorldFromAsFarAsTheHazeLetsItBeSeen) {
+  worlds::MeshBuilder builder;
+  const auto ground = builder.add_object(worlds::SurfaceClass::kGround, 0.3);
+  builder.add_box(ground, Pose(), {400, 400, 0.1});
+  PictureRenderer renderer(builder.finish());
+  PictureOptions clear = small_picture();
+  clear.visibility_m = 20000;
+  const auto [near_r, near_g, near_b] =
+      pixel(renderer.render(look_at({0, -1, 200}, {0, 0, 0}), clear), 80, 60);
+  const auto [far_r, far_g, far_b] =
+      pixel(renderer.render(look_at({0, -1, 900}, {0, 0, 0}), clear), 80, 60);
+  EXPECT_GT(near_g, near_b);
+  EXPECT_GT(far_g, far_b);
+}
+
 TEST(Picture, IsSavedAsPng) {
   Picture picture{3, 2, {}};
   picture.rgb.assign(18, 200);

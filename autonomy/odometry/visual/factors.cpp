@@ -34,10 +34,9 @@ struct Path {
   Vec3 in_Bi;  ///< in the anchor's B
   Vec3 in_Bj;  ///< in the observer's B
   Vec3 in_Cj;  ///< in the observer's C
-  Vec3 in_eye;
 };
 
-Path path_of(const Sight& s, const Exposure& i, const Exposure& j, const CameraState& camera,
+Path path_of(const Exposure& i, const Exposure& j, const CameraState& camera,
              const LandmarkState& landmark) {
   const double rho = landmark.inverse_depth;
   Path path;
@@ -45,7 +44,6 @@ Path path_of(const Sight& s, const Exposure& i, const Exposure& j, const CameraS
   path.in_Bi = camera.X_BC.R * path.ray + rho * camera.X_BC.p;
   path.in_Bj = j.R_OB.transpose() * (i.R_OB * path.in_Bi + rho * (i.p_OB - j.p_OB));
   path.in_Cj = camera.X_BC.R.transpose() * (path.in_Bj - rho * camera.X_BC.p);
-  path.in_eye = path.in_Cj - (s.right ? rho * s.baseline_m : 0.0) * Vec3::UnitX();
   return path;
 }
 
@@ -132,29 +130,40 @@ Exposure::Exposure(const FrameState& x, const FrameTiming& timing, double t_d)
 
 std::optional<Vec2> sight_residual(const Sight& sight, const Exposure& anchor, const Exposure& seen,
                                    const CameraState& camera, const LandmarkState& landmark) {
-  const Vec2& z = sight.right ? *sight.seen.right : sight.seen.left;
+  const Vec2& left = sight.seen.left;
+  const Vec2 shift = sight.right ? Vec2(left - *sight.seen.right) : Vec2(Vec2::Zero());
   if (sight.own) {
-    const double disparity = sight.right ? landmark.inverse_depth * sight.baseline_m : 0;
-    return Vec2(landmark.ray - disparity * Vec2::UnitX() - z);
+    if (!sight.right) return Vec2(landmark.ray - left);
+    return Vec2(landmark.inverse_depth * sight.baseline_m * Vec2::UnitX() - shift);
   }
-  const Vec3 p = path_of(sight, anchor, seen, camera, landmark).in_eye;
+  const Path path = path_of(anchor, seen, camera, landmark);
+  const Vec3& p = path.in_Cj;
   if (p.z() < kLeastForward * p.norm()) return std::nullopt;
-  return Vec2(p.head<2>() / p.z() - z);
+  if (!sight.right) return Vec2(p.head<2>() / p.z() - left);
+  return Vec2(landmark.inverse_depth * sight.baseline_m / p.z() * Vec2::UnitX() - shift);
 }
 
 SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor, const Exposure& seen,
                                const CameraState& camera, const LandmarkState& landmark) {
   SightJacobians J;
   if (sight.own) {
-    J.landmark << Eigen::Matrix2d::Identity(),
-        (sight.right ? -sight.baseline_m : 0.0) * Vec2::UnitX();
+    J.landmark.setZero();
+    if (sight.right) {
+      J.landmark(0, 2) = sight.baseline_m;
+    } else {
+      J.landmark.leftCols<2>().setIdentity();
+    }
     return J;
   }
   const double rho = landmark.inverse_depth;
-  const Path path = path_of(sight, anchor, seen, camera, landmark);
-  const Vec3& p = path.in_eye;
-  Eigen::Matrix<double, 2, 3> D;  // of the projection
-  D << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
+  const Path path = path_of(anchor, seen, camera, landmark);
+  const Vec3& p = path.in_Cj;
+  Eigen::Matrix<double, 2, 3> D;  // of the projection, or of the disparity
+  if (sight.right) {
+    D << 0, 0, -rho * sight.baseline_m / (p.z() * p.z()), 0, 0, 0;
+  } else {
+    D << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
+  }
 
   const Mat3& R_BC = camera.X_BC.R;
   const Eigen::Matrix<double, 2, 3> by_Bj = D * R_BC.transpose();
@@ -167,9 +176,9 @@ SightJacobians sight_jacobians(const Sight& sight, const Exposure& anchor, const
   J.seen << by_seen * seen.turn, -rho * by_O;
   J.camera << D * so3::hat(path.in_Cj) - by_ray * so3::hat(path.ray), rho * (by_Bi - by_Bj),
       by_anchor * anchor.rate + by_seen * seen.rate + rho * by_O * (anchor.v_OB - seen.v_OB);
-  J.landmark << by_ray.leftCols<2>(), by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) -
-                                          by_Bj * camera.X_BC.p -
-                                          (sight.right ? sight.baseline_m : 0.0) * D.col(0);
+  J.landmark << by_ray.leftCols<2>(),
+      by_Bi * camera.X_BC.p + by_O * (anchor.p_OB - seen.p_OB) - by_Bj * camera.X_BC.p;
+  if (sight.right) J.landmark(0, 2) += sight.baseline_m / p.z();
   return J;
 }
 

@@ -23,8 +23,16 @@ LinearRows stacked(const std::vector<LinearRows>& parts) {
   return all;
 }
 
-/// What the landmarks anchored in the oldest frame say of poses and camera, without their sights in
-/// the newest.
+/// Which of a landmark's sights it starts afresh with when those before go into the prior; their
+/// number: none. One that the newest frame does not see is over.
+std::size_t fresh_from(const Window& window, const Landmark& landmark, const WindowNoise& noise) {
+  const std::size_t n = landmark.seen.size();
+  if (landmark.seen.back().frame != window.newest().number) return n;
+  return n - std::min(static_cast<std::size_t>(noise.fresh_sights), n - 1);
+}
+
+/// What the landmarks anchored in the oldest frame say of poses and camera, without the sights that
+/// they start afresh with.
 LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   const WindowLayout layout = window.layout();
   const int n = layout.visual_size();
@@ -32,9 +40,10 @@ LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   const WindowExposures exposures(window, noise);
   for (auto& [id, landmark] : window.landmarks) {
     if (landmark.seen.front().frame != window.frames.front().number) continue;
-    if (noise.uses(landmark)) {
-      add_landmark(window, exposures, landmark, noise, window.newest().number, equations);
-    }
+    if (!noise.uses(landmark)) continue;
+    const std::size_t count = fresh_from(window, landmark, noise);
+    // A single frame says nothing of the others.
+    if (count >= 2) add_landmark(window, exposures, landmark, noise, count, equations);
   }
   const ReducedEquations reduced = reduce(equations, 0);
   const Eigen::MatrixXd H = reduced.H.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
@@ -44,8 +53,8 @@ LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   return rows;
 }
 
-/// Inverse depth of the landmark along its ray in another frame, 1/m.
-double inverse_depth_from(const Window& window, const Landmark& landmark, const Observation& seen) {
+/// The landmark as another frame's left eye has it; its depth unknown where it is hardly before it.
+LandmarkState state_from(const Window& window, const Landmark& landmark, const Observation& seen) {
   const Observation& anchor = landmark.seen.front();
   const auto pose = [&](const Observation& o) {
     const FrameState& x = window.frames[static_cast<std::size_t>(window.slot(o.frame))].state;
@@ -55,29 +64,26 @@ double inverse_depth_from(const Window& window, const Landmark& landmark, const 
       pose(seen).inverse() *
       (pose(anchor) * Vec3(landmark.state.ray.homogeneous() / landmark.state.inverse_depth));
   constexpr double kNearest = 0.1;  // m
-  return p.z() > kNearest ? 1 / p.z() : 0;
+  if (p.z() <= kNearest) return {seen.left, 0};
+  return {p.hnormalized(), 1 / p.z()};
 }
 
 /// Landmarks anchored in the oldest frame find another anchor, or go.
 void leave_oldest(Window& window, const WindowNoise& noise) {
-  const std::int64_t oldest = window.frames.front().number, newest = window.newest().number;
+  const std::int64_t oldest = window.frames.front().number;
   for (auto it = window.landmarks.begin(); it != window.landmarks.end();) {
     Landmark& landmark = it->second;
-    if (landmark.seen.front().frame == oldest) {
-      if (noise.uses(landmark)) {
-        const Observation last = landmark.seen.back();
-        if (last.frame == newest) {
-          landmark.state = {last.left, inverse_depth_from(window, landmark, last)};
-          landmark.seen = {last};
-        } else {
-          landmark.seen.clear();
-        }
-      } else {
-        landmark.seen.erase(landmark.seen.begin());
-        if (!landmark.seen.empty()) landmark.state = {landmark.seen.front().left, 0};
+    std::vector<Observation>& seen = landmark.seen;
+    if (seen.front().frame == oldest) {
+      const bool used = noise.uses(landmark);
+      const std::size_t from = used ? fresh_from(window, landmark, noise) : 1;
+      if (from < seen.size()) {
+        landmark.state =
+            used ? state_from(window, landmark, seen[from]) : LandmarkState{seen[from].left, 0};
       }
+      seen.erase(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(from));
     }
-    it = landmark.seen.empty() ? window.landmarks.erase(it) : std::next(it);
+    it = seen.empty() ? window.landmarks.erase(it) : std::next(it);
   }
 }
 

@@ -55,6 +55,7 @@ FrameState predict(const FrameState& from, const Preintegration& imu) {
 SlidingWindow::SlidingWindow(const SlidingWindowConfig& config) : config_(config) {
   noise_.huber_sigma = config.huber_sigma;
   noise_.least_images = config.least_observations;
+  noise_.fresh_sights = config.fresh_sights;
   noise_.first_estimates = config.first_estimates;
 }
 
@@ -62,9 +63,11 @@ void SlidingWindow::start(const WindowStart& start, const CameraState& camera,
                           const CameraError& camera_std, const FeatureFrame& features) {
   focal_px_ = features.f_px;
   noise_.ray_std = config_.pixel_std / features.f_px;
+  noise_.disparity_std = config_.disparity_std / features.f_px;
   noise_.baseline_m = features.baseline_m;
   window_ = {};
   dropped_imu_.reset();
+  waited_ = 0;
   window_.camera = camera;
   window_.frames.push_back(
       {next_number_++, features.stamp, {camera.t_d, Vec3::Zero()}, true, start.state, {}});
@@ -148,16 +151,17 @@ double SlidingWindow::median_innovation_px() const {
   return *middle;
 }
 
-bool SlidingWindow::is_keyframe(const WindowUpdate& update) const {
+bool SlidingWindow::is_keyframe(const WindowUpdate& update) {
   const WindowFrame& last = window_.frames[window_.frames.size() - 2];
   const WindowFrame& newest = window_.newest();
   const Mat3& R_BC = window_.camera.X_BC.R;
   const Mat3 turn = (newest.state.R_OB * R_BC).transpose() * last.state.R_OB * R_BC;
-  int common = 0, seen = 0;
+  int common = 0, seen = 0, both = 0;
   double parallax = 0;
   for (const auto& [id, landmark] : window_.landmarks) {
     if (landmark.seen.back().frame != newest.number) continue;
     ++seen;
+    both += landmark.seen.back().right.has_value();
     if (landmark.seen.size() < 2) continue;
     const Observation& before = landmark.seen[landmark.seen.size() - 2];
     if (before.frame != last.number) continue;
@@ -166,8 +170,14 @@ bool SlidingWindow::is_keyframe(const WindowUpdate& update) const {
         (landmark.seen.back().left - Vec3(turn * before.left.homogeneous()).hnormalized()).norm();
   }
   if (seen < kLeastOfKeyframe) return false;
-  return update.tracked < config_.keyframe_tracked || 2 * common < seen ||
-         parallax > config_.keyframe_parallax_rad * common;
+  if (update.tracked >= config_.keyframe_tracked && 2 * common >= seen &&
+      parallax <= config_.keyframe_parallax_rad * common) {
+    return false;
+  }
+  // What both eyes saw goes with a frame that is dropped: it is worth a wait.
+  const bool waits = 2 * both < seen && waited_ < config_.keyframe_wait;
+  waited_ = waits ? waited_ + 1 : 0;
+  return !waits;
 }
 
 void SlidingWindow::drop_outliers(WindowUpdate& update) {

@@ -63,7 +63,7 @@ class SlidingWindow {
   void observe(const FeatureFrame& features, WindowUpdate& update);
   void triangulate_new();
   [[nodiscard]] double median_innovation_px() const;
-  [[nodiscard]] bool is_keyframe(const WindowUpdate& update) const;
+  [[nodiscard]] bool is_keyframe(const WindowUpdate& update);
   void drop_outliers(WindowUpdate& update);
   void relinearise_imu();
 
@@ -73,6 +73,7 @@ class SlidingWindow {
   Window window_;
   std::int64_t next_number_ = 0;
   std::optional<Preintegration> dropped_imu_;  ///< of the frame that the next one replaces
+  int waited_ = 0;                             ///< frames that would have been keyframes
 };
 
 /// The state that a frame's IMU leads to.

@@ -79,14 +79,17 @@ struct FeatureTrackerConfig {
 /// The back end: keyframes, robust factors, iterations.
 struct SlidingWindowConfig {
   int keyframes = 10;
-  double pixel_std = 1.0;
-  double huber_sigma = 1.5;
+  double pixel_std = 0.5;
+  double disparity_std = 0.15;
+  double huber_sigma = 1.0;
   int least_observations = 3;
-  double outlier_px = 3;
+  int fresh_sights = 1;
+  double outlier_px = 1.5;
   int iterations = 4;
   double converged = 0.02;
   int keyframe_tracked = 40;
   double keyframe_parallax_rad = 10.0 / 460;
+  int keyframe_wait = 1;
   bool first_estimates = true;
 
   void fields(auto& f) {
@@ -94,10 +97,14 @@ struct SlidingWindowConfig {
     f("pixel_std", pixel_std,
       "noise of a tracked feature, px, 1 sigma, with what is alike among neighbours and frames "
       "(VINS-Fusion: 1.5)");
-    f("huber_sigma", huber_sigma, "residuals beyond count linearly");
+    f("disparity_std", disparity_std,
+      "noise of what the eyes differ by, px, 1 sigma: what a track has drifted by both eyes share");
+    f("huber_sigma", huber_sigma, "residuals beyond count linearly (VINS-Fusion)");
     f("least_observations", least_observations,
       "images of either eye that a landmark needs to count");
-    f("outlier_px", outlier_px, "a landmark whose residuals' mean is larger goes (VINS-Fusion)");
+    f("fresh_sights", fresh_sights,
+      "newest frames whose sights of a landmark stay when what came before goes into the prior");
+    f("outlier_px", outlier_px, "a landmark whose residuals' mean is larger goes (VINS-Fusion: 3)");
     f("iterations", iterations, "of an optimisation (3 do as well as 8)");
     f("converged", converged,
       "a step below this many sigma, RMS over the unknowns, ends the iterations");
@@ -106,14 +113,17 @@ struct SlidingWindowConfig {
     f("keyframe_parallax_rad", keyframe_parallax_rad,
       "so is one whose features have moved by this since the last, the turn taken out "
       "(VINS-Fusion: 10 px at 460)");
+    f("keyframe_wait", keyframe_wait, "frames that a keyframe waits for one that both eyes saw");
     f("first_estimates", first_estimates,
       "Jacobians where the prior was linearised: keeps yaw and position unobservable");
     f.check(keyframes >= 3 && keyframes <= 40, "3 <= keyframes <= 40");
-    f.check(pixel_std > 0 && huber_sigma > 0 && outlier_px > 0,
-            "pixel_std, huber_sigma, outlier_px > 0");
+    f.check(pixel_std > 0 && disparity_std > 0 && huber_sigma > 0 && outlier_px > 0,
+            "pixel_std, disparity_std, huber_sigma, outlier_px > 0");
     f.check(least_observations >= 2 && least_observations <= 20, "2 <= least_observations <= 20");
+    f.check(fresh_sights >= 1, "fresh_sights >= 1");
     f.check(iterations >= 1 && iterations <= 100, "1 <= iterations <= 100");
-    f.check(keyframe_parallax_rad > 0, "keyframe_parallax_rad > 0");
+    f.check(keyframe_parallax_rad > 0 && keyframe_wait >= 0,
+            "keyframe_parallax_rad > 0, keyframe_wait >= 0");
   }
 };
 

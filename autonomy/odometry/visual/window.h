@@ -68,10 +68,12 @@ struct Window {
 
 /// How its measurements are weighed.
 struct WindowNoise {
-  double ray_std = 1.0 / 423;  ///< of a feature, in normalised coordinates
+  double ray_std = 1.0 / 423;         ///< of a feature, in normalised coordinates
+  double disparity_std = 0.15 / 423;  ///< of what the eyes differ by, likewise
   double huber_sigma = 1.5;
   double baseline_m = 0.05;
   int least_images = 3;
+  int fresh_sights = 1;  ///< that a landmark starts afresh with after the rest went into the prior
   bool first_estimates = true;
 
   /// Whether the landmark counts.

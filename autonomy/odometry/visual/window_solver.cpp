@@ -91,16 +91,17 @@ void take_back(Window& window, const NormalEquations& equations, const Undo& und
   }
 }
 
-/// Calls `visit(sight, slot of the anchor, slot of the observer)` for each of a landmark's sights.
+/// Calls `visit(sight, slot of the anchor, slot of the observer)` for the sights that a landmark's
+/// first `count` frames have of it.
 template <class Visit>
 void for_each_sight(const Window& window, const Landmark& landmark, const WindowNoise& noise,
-                    std::int64_t left_out, const Visit& visit) {
+                    std::size_t count, const Visit& visit) {
   const Observation& anchor = landmark.seen.front();
   const auto anchor_slot = static_cast<std::size_t>(window.slot(anchor.frame));
-  for (const Observation& seen : landmark.seen) {
-    if (seen.frame == left_out) continue;
+  for (std::size_t i = 0; i < std::min(count, landmark.seen.size()); ++i) {
+    const Observation& seen = landmark.seen[i];
     const auto slot = static_cast<std::size_t>(window.slot(seen.frame));
-    Sight sight{seen, &seen == &anchor, false, noise.baseline_m};
+    Sight sight{seen, i == 0, false, noise.baseline_m};
     visit(sight, anchor_slot, slot);
     sight.right = true;
     if (seen.right) visit(sight, anchor_slot, slot);
@@ -171,10 +172,9 @@ WindowExposures::WindowExposures(const Window& window, const WindowNoise& noise)
 }
 
 void add_landmark(const Window& window, const WindowExposures& exposures, Landmark& landmark,
-                  const WindowNoise& noise, std::int64_t left_out, NormalEquations& out) {
+                  const WindowNoise& noise, std::size_t count, NormalEquations& out) {
   const WindowLayout layout = window.layout();
   const int camera = layout.camera();
-  const double scale = 1 / noise.ray_std;
   NormalEquations::LandmarkTerm term;
   term.landmark = &landmark;
   Eigen::Matrix<double, Eigen::Dynamic, kLandmarkDim> W =
@@ -183,6 +183,7 @@ void add_landmark(const Window& window, const WindowExposures& exposures, Landma
     const auto residual =
         sight_residual(sight, exposures.now[a], exposures.now[s], window.camera, landmark.state);
     if (!residual) return;
+    const double scale = 1 / (sight.right ? noise.disparity_std : noise.ray_std);
     const Robust robust = huber(scale * residual->norm(), noise.huber_sigma);
     out.cost += robust.cost;
     const double factor = scale * std::sqrt(robust.weight);
@@ -211,7 +212,7 @@ void add_landmark(const Window& window, const WindowExposures& exposures, Landma
     W.middleRows<kPoseDim>(ps).noalias() += J.seen.transpose() * J.landmark;
     W.middleRows<kCameraDim>(camera).noalias() += J.camera.transpose() * J.landmark;
   };
-  for_each_sight(window, landmark, noise, left_out, visit);
+  for_each_sight(window, landmark, noise, count, visit);
   // Without a depth its ray says nothing of the frames.
   if (term.H(2, 2) <= 0) return;
   const Eigen::Index column = kLandmarkDim * static_cast<Eigen::Index>(out.terms.size());
@@ -226,7 +227,8 @@ NormalEquations linearise(Window& window, const WindowNoise& noise) {
   for (int to = 1; to < window.layout().frames; ++to) add_imu(window, to, noise, out);
   const WindowExposures exposures(window, noise);
   for (auto& [id, landmark] : window.landmarks) {
-    if (noise.uses(landmark)) add_landmark(window, exposures, landmark, noise, -1, out);
+    if (!noise.uses(landmark)) continue;
+    add_landmark(window, exposures, landmark, noise, landmark.seen.size(), out);
   }
   return out;
 }
@@ -319,7 +321,7 @@ std::optional<double> mean_residual(const Window& window, const WindowExposures&
   double sum = 0;
   int count = 0;
   bool behind = false;
-  for_each_sight(window, landmark, noise, -1,
+  for_each_sight(window, landmark, noise, landmark.seen.size(),
                  [&](const Sight& sight, std::size_t a, std::size_t s) {
                    const auto residual = sight_residual(sight, exposures.now[a], exposures.now[s],
                                                         window.camera, landmark.state);

@@ -63,10 +63,10 @@ struct WindowExposures {
                                                   const WindowExposures& exposures,
                                                   const Landmark& landmark,
                                                   const WindowNoise& noise);
-/// Adds the sights of one landmark, but those of frame `left_out` (-1: none), to `equations` as a
-/// term of its own.
+/// Adds the sights that the first `count` frames have of a landmark to `equations` as a term of its
+/// own.
 void add_landmark(const Window& window, const WindowExposures& exposures, Landmark& landmark,
-                  const WindowNoise& noise, std::int64_t left_out, NormalEquations& equations);
+                  const WindowNoise& noise, std::size_t count, NormalEquations& equations);
 /// Equations of nothing, for the window's layout.
 [[nodiscard]] NormalEquations empty_equations(const Window& window);
 /// Whitened rows of the IMU between frames `to` - 1 and `to`.

@@ -155,9 +155,26 @@ TEST(SightFactor, OfTheAnchorHangsOnTheLandmarkAlone) {
     const Sight sight{s.anchor, true, right, 0.05};
     EXPECT_LT(sight_residual(sight, placed, placed, s.camera, point)->norm(), 1e-12);
     const SightJacobians J = sight_jacobians(sight, placed, placed, s.camera, point);
-    EXPECT_TRUE(J.landmark.leftCols<2>().isIdentity(0));
-    EXPECT_DOUBLE_EQ(J.landmark(0, 2), right ? -0.05 : 0);
+    // Where it stands in the image, both eyes share; how far it is, what they differ by tells.
+    EXPECT_TRUE(right ? J.landmark.leftCols<2>().isZero(0)
+                      : J.landmark.leftCols<2>().isIdentity(0));
+    EXPECT_DOUBLE_EQ(J.landmark(0, 2), right ? 0.05 : 0);
   }
+}
+
+// A track that has slipped along its surface's image takes the right eye's with it.
+TEST(SightFactor, OfTheRightEyeIsFreeOfWhatTheTrackHasDriftedBy) {
+  Scene s(7);
+  const Exposure a(s.a, s.of_a, s.camera.t_d), b(s.b, s.of_b, s.camera.t_d);
+  const Sight sight{s.seen, false, true, 0.05};
+  const Vec2 before = *sight_residual(sight, a, b, s.camera, s.point);
+  const Vec2 slip(0.01, -0.02);
+  s.seen.left += slip;
+  *s.seen.right += slip;
+  const Vec2 after = *sight_residual(sight, a, b, s.camera, s.point);
+  EXPECT_LT((after - before).norm(), 1e-12);
+  s.seen.right->x() -= 0.003;  // further apart: nearer than it was
+  EXPECT_NEAR(sight_residual(sight, a, b, s.camera, s.point)->x(), after.x() - 0.003, 1e-12);
 }
 
 TEST(SightFactor, RefusesWhatLiesBehindTheCamera) {
@@ -180,9 +197,9 @@ Landmark seen_by_both(const Scene& s, double inverse_depth, bool stereo) {
   const Exposure a(s.a, {}, 0), b(s.b, {}, 0);
   const LandmarkState point{anchor.left, inverse_depth};
   const Vec2 l = *sight_residual({other, false, false, 0.05}, a, b, s.camera, point);
-  const Vec2 r = *sight_residual({other, false, true, 0.05}, a, b, s.camera, point);
+  const Vec2 disparity = *sight_residual({other, false, true, 0.05}, a, b, s.camera, point);
   other.left = l;
-  other.right = r;
+  other.right = l - disparity;
   if (stereo) {
     anchor.right = anchor.left - inverse_depth * 0.05 * Vec2::UnitX();
   } else {

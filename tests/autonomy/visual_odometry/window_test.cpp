@@ -19,7 +19,8 @@ constexpr double kBaseline = 0.05, kFocal = 422.6;
 WindowNoise noise_of(bool first_estimates) {
   WindowNoise noise;
   noise.ray_std = 0.5 / kFocal;
-  noise.huber_sigma = 1e6;  // linear problems only
+  noise.disparity_std = std::sqrt(2.0) * noise.ray_std;  // each eye's by itself
+  noise.huber_sigma = 1e6;                               // linear problems only
   noise.baseline_m = kBaseline;
   noise.first_estimates = first_estimates;
   return noise;

@@ -172,6 +172,7 @@ bool SlidingWindow::is_keyframe(const WindowUpdate& update) {
   if (seen < kLeastOfKeyframe) return false;
   if (update.tracked >= config_.keyframe_tracked && 2 * common >= seen &&
       parallax <= config_.keyframe_parallax_rad * common) {
+    waited_ = 0;
     return false;
   }
   // What both eyes saw goes with a frame that is dropped: it is worth a wait.

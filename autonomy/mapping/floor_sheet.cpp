@@ -24,9 +24,12 @@ constexpr int kGuessedPerLayer = 4;
 constexpr int kMostGuessedLayers = FloorSheet::kMostTolerance - kTolerance;
 /// Planes that differ by less at a tile's corners say the same: the 2D map is not made anew.
 constexpr double kSame = 1.0;
-/// A floor that was seen stays where it meets its neighbour's at their common edge, though rays
-/// that graze it wear it off the map. Beside the tolerance: what both planes err there.
+/// What the planes of neighbours err at their common edge, beside the tolerance.
 constexpr double kMeet = 1.0;
+/// A floor that was seen stays where it comes so near to its neighbour's at their common edge, though
+/// rays that graze it wear it off the map: half a metre, for what is left of the neighbour's has a
+/// slope of its own, and the next storey is five times as far.
+constexpr double kStays = 5.0;
 /// Neighbours whose floors are further apart than this do not meet; half a band, that what is free
 /// over one is free over the other.
 constexpr double kBrink = 10;
@@ -184,10 +187,11 @@ std::vector<std::size_t> FloorSheet::spread() {
     Tile& tile = tiles_[t];
     const bool same =
         tile.label.known == tile.shown.known && say_the_same(tile.label.plane, tile.shown.plane);
+    const bool was_unseen_ramp = is_unseen_ramp(t);
     tile.shown.seen = tile.label.seen;
-    if (same) continue;
-    tile.shown = tile.label;
-    changed.push_back(t);
+    tile.shown.ramp = tile.label.ramp;
+    if (!same) tile.shown = tile.label;
+    if (!same || is_unseen_ramp(t) != was_unseen_ramp) changed.push_back(t);
   }
   find_brinks(brinks);
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
@@ -387,7 +391,7 @@ FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& st
   if (const Label& before = tiles_[tile].shown; before.known && before.seen) {
     const Vec2 edge = Vec2::Constant(TilePlane::kMiddle) - 0.5 * kBrickCells * step.cast<double>();
     const double apart = before.plane.at(edge.x(), edge.y()) - expected.at(edge.x(), edge.y());
-    if (std::abs(apart) <= most + kMeet) {
+    if (std::abs(apart) <= kStays) {
       label.plane = before.plane;
       label.seen = true;
       return label;
@@ -396,6 +400,7 @@ FloorSheet::Label FloorSheet::go_on(const Label& from, const Eigen::Vector2i& st
   label.plane = expected;
   label.plane.rise *= 0.5;
   label.guessed = from.guessed + 1;
+  label.ramp = from.ramp || (from.seen && from.plane.rise.norm() >= kLevel);
   return label;
 }
 

@@ -94,6 +94,10 @@ class FloorSheet {
   [[nodiscard]] std::optional<TilePlane> plane(std::size_t tile) const;
   /// Whether the floor of a tile was seen; otherwise it is its neighbours', gone on.
   [[nodiscard]] bool is_seen(std::size_t tile) const { return tiles_[tile].shown.seen; }
+  /// Whether the floor of a tile is a ramp's, gone on unseen: how high it is, nobody knows.
+  [[nodiscard]] bool is_unseen_ramp(std::size_t tile) const {
+    return !tiles_[tile].shown.seen && tiles_[tile].shown.ramp;
+  }
   /// Columns at which the floor of a tile ends above that of its neighbour.
   [[nodiscard]] std::uint64_t brinks(std::size_t tile) const { return tiles_[tile].brinks; }
   /// Whether the floor of a tile leads on to where the map can't show it yet.
@@ -108,7 +112,8 @@ class FloorSheet {
     TilePlane plane;
     bool known = false;
     bool seen = false;
-    int guessed = 0;  ///< tiles since the last that was seen
+    int guessed = 0;    ///< tiles since the last that was seen
+    bool ramp = false;  ///< guessed, and the last that was seen is a ramp
   };
   struct Place {
     Eigen::Vector2i tile = Eigen::Vector2i::Zero();

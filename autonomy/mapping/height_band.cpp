@@ -214,6 +214,8 @@ void HeightBand::evaluate(std::size_t t) {
       }
     }
   }
+  // By a floor that was guessed too high, what hangs over a ramp would bar it.
+  if (sheet_ && sheet_->is_unseen_ramp(t)) occupied = 0;
   const bool leads_on_unseen = sheet_ && sheet_->is_mouth(t);
   const std::uint64_t enough = leads_on_unseen ? 0 : free[static_cast<std::size_t>(min_free_)];
   for (unsigned i = 0; i < 64; ++i) {

@@ -26,9 +26,9 @@ constexpr int kMostGuessedLayers = FloorSheet::kMostTolerance - kTolerance;
 constexpr double kSame = 1.0;
 /// What the planes of neighbours err at their common edge, beside the tolerance.
 constexpr double kMeet = 1.0;
-/// A floor that was seen stays where it comes so near to its neighbour's at their common edge, though
-/// rays that graze it wear it off the map: half a metre, for what is left of the neighbour's has a
-/// slope of its own, and the next storey is five times as far.
+/// A floor that was seen stays where it comes so near to its neighbour's at their common edge,
+/// though rays that graze it wear it off the map: half a metre, for what is left of the neighbour's
+/// has a slope of its own, and the next storey is five times as far.
 constexpr double kStays = 5.0;
 /// Neighbours whose floors are further apart than this do not meet; half a band, that what is free
 /// over one is free over the other.

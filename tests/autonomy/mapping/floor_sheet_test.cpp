@@ -287,6 +287,48 @@ TEST(FloorSheet, KeepsAFloorThatIsWornOffTheMap) {
   }
 }
 
+// What is left of a floor may be a step of it, whose plane leads on half a metre too high.
+TEST(FloorSheet, KeepsAFloorOfWhichAStepIsLeft) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    site.give_to(sheet);
+    sheet.note_place({0, 10}, 13);
+    sheet.spread();
+    for (int x = 32; x < 160; ++x) {
+      for (int y = 56; y < 104; ++y) site.at(x, y).clear();
+    }
+    site.add(33, 38, 56, 104, [&](int, int) { return -slope * (34 - 24); });
+    site.give_to(sheet);
+    sheet.spread();
+    for (int x = 5; x < 17; ++x) {
+      for (int y = 8; y < 12; ++y) {
+        EXPECT_TRUE(sheet.is_seen(tile(x, y))) << x << " " << y;
+        EXPECT_NEAR(height(sheet, x, y), -slope * (8 * x + 4 - 24), 1.5) << x << " " << y;
+      }
+    }
+  }
+}
+
+// How high a ramp's unseen end is, nobody knows: what is in the band over it need not bar it.
+TEST(FloorSheet, TellsTheUnseenEndOfARampFromOtherUnseenFloor) {
+  FloorSheet sheet = make_sheet();
+  make_garage(1).give_to(sheet, -60);  // from above
+  sheet.note_place({0, 10}, 13);
+  sheet.spread();
+  EXPECT_TRUE(sheet.is_unseen_ramp(tile(17, 10)));
+  EXPECT_FALSE(sheet.is_unseen_ramp(tile(10, 10)));  // seen
+  Site gap;
+  gap.add(0, 100, 0, 160, [](int, int) { return 0.0; });
+  FloorSheet level = make_sheet();
+  gap.give_to(level);
+  level.note_place({0, 10}, 13);
+  level.spread();
+  EXPECT_FALSE(level.is_seen(tile(15, 10)));
+  EXPECT_FALSE(level.is_unseen_ramp(tile(15, 10)));
+}
+
 // From the yard over the parapet into the ramp's shaft: from there on the ramp is the floor.
 TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
   FloorSheet sheet = make_sheet();

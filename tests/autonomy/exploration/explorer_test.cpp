@@ -41,13 +41,7 @@ class GridWorld {
     now_ += kNanosecondsPerSecond;
     for (int step = 0; step < 10; ++step) {
       const Eigen::Vector2i here = map_.cell_of(p_);
-      Eigen::Vector2i next = here;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const Eigen::Vector2i cell = here + Eigen::Vector2i(dx, dy);
-          if (field.travel_distance(cell) < field.travel_distance(next)) next = cell;
-        }
-      }
+      const Eigen::Vector2i next = test::next_towards(field, here);
       if (next == here) {
         progress_ =
             here == map_.cell_of(goal) ? TargetProgress::kReached : TargetProgress::kUnreachable;

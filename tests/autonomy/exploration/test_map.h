@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "exploration/exploration_space.h"
 #include "mapping/line_walk.h"
 #include "mapping/occupancy_map_2d.h"
 #include "math/random.h"
@@ -109,6 +110,19 @@ inline void reveal(const OccupancyMap2D& truth, const Vec2& p, double range_m,
                 return truth.at(cell) == OccupancyMap2D::kFree;
               });
   }
+}
+
+/// The neighbour of a cell from which the way to where the field begins is shortest; the cell
+/// itself where none is nearer.
+inline Eigen::Vector2i next_towards(const ExplorationSpace& field, const Eigen::Vector2i& here) {
+  Eigen::Vector2i next = here;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const Eigen::Vector2i cell = here + Eigen::Vector2i(dx, dy);
+      if (field.travel_distance(cell) < field.travel_distance(next)) next = cell;
+    }
+  }
+  return next;
 }
 
 inline OccupancyMap2D unknown_like(const OccupancyMap2D& truth) {

@@ -106,13 +106,7 @@ class Flight {
     progress_ = TargetProgress::kUnderWay;
     for (double left = kSpeed_mps; left > 0;) {
       const Eigen::Vector2i here = map_.cell_of(p_);
-      Eigen::Vector2i next = here;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const Eigen::Vector2i cell = here + Eigen::Vector2i(dx, dy);
-          if (field.travel_distance(cell) < field.travel_distance(next)) next = cell;
-        }
-      }
+      const Eigen::Vector2i next = test::next_towards(field, here);
       if (next == here) {
         const bool there = (map_.centre_of(here) - goal).norm() < 2 * map_.resolution;
         progress_ = there ? TargetProgress::kReached : TargetProgress::kUnreachable;

@@ -16,13 +16,13 @@ constexpr const std::array<std::string_view, 3>& enum_names(CaseC) { return kCas
 
 struct CandidateFilterConfig {
   double obstacle_distance_m = 0.4;  ///< case A
-  double min_gain_m2 = 0.2;          ///< case B (rrt_exploration)
+  double min_gain_m2 = 0.3;  ///< case B; as exploration.stop.min_area_m2 (rrt_exploration: 0.2)
   CaseC case_c = CaseC::kDirected;
   double max_angle_rad = 2.1;  ///< case C: 120 deg; the paper prints no value
 
   void fields(auto& f) {
     f("obstacle_distance_m", obstacle_distance_m, "case A: nearer to an obstacle is dropped");
-    f("min_gain_m2", min_gain_m2, "case B: less unknown area is dropped (rrt_exploration)");
+    f("min_gain_m2", min_gain_m2, "case B: less unknown area is dropped");
     f("case_c", case_c, "case C applies where the revenue is direction-aware, always, or never");
     f("max_angle_rad", max_angle_rad,
       "case C: further from the exploration direction is dropped, unless that leaves none; the "

@@ -56,11 +56,14 @@ void ExplorationSpace::measure_clearance() {
   clearance_ = squared_distances(map_.width, map_.height, [&](std::size_t i) {
     return map_.cells[i] == OccupancyMap2D::kOccupied;
   });
-  const double radius_cells = config_.travel_radius_m / map_.resolution;
-  const double passable = radius_cells * radius_cells - 1e-6;
   for (std::size_t i = 0; i < flags_.size(); ++i) {
-    if ((flags_[i] & kFree) != 0 && clearance_[i] >= passable) flags_[i] |= kClear | kPassable;
+    if ((flags_[i] & kFree) != 0 && is_clear(i)) flags_[i] |= kClear | kPassable;
   }
+}
+
+bool ExplorationSpace::is_clear(std::size_t cell) const {
+  const double radius_cells = config_.travel_radius_m / map_.resolution;
+  return clearance_[cell] >= radius_cells * radius_cells - 1e-6;
 }
 
 template <class Accepts>
@@ -197,6 +200,49 @@ double ExplorationSpace::unknown_area(const Vec2& p) const {
         unknown_count_.data() +
         static_cast<std::size_t>(y) * (static_cast<std::size_t>(map_.width) + 1);
     count += row[x_end] - row[x_first];
+  }
+  return static_cast<double>(count) * map_.resolution * map_.resolution;
+}
+
+UnknownLeft ExplorationSpace::unknown_left(const UnknownLeft& limit) const {
+  const std::array<Eigen::Vector2i, 4> sides{Eigen::Vector2i{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+  const double cell_m2 = map_.resolution * map_.resolution;
+  std::vector<bool> met(flags_.size());
+  std::vector<Eigen::Vector2i> open;
+  UnknownLeft left;
+  for (int y = 0; y < map_.height; ++y) {
+    for (int x = 0; x < map_.width; ++x) {
+      if (travel_[map_.index({x, y})] == kFar) continue;
+      open.emplace_back(x, y);
+      double pocket_m2 = 0;
+      while (!open.empty()) {
+        const Eigen::Vector2i cell = open.back();
+        open.pop_back();
+        for (const Eigen::Vector2i& side : sides) {
+          const Eigen::Vector2i next = cell + side;
+          if (!map_.contains(next)) continue;
+          const std::size_t to = map_.index(next);
+          const bool unknown = (flags_[to] & kUnknown) != 0;
+          const bool may_be_passed = unknown || (flags_[to] & kFree) != 0;
+          if (met[to] || travel_[to] != kFar || !may_be_passed || !is_clear(to)) continue;
+          met[to] = true;
+          open.push_back(next);
+          if (!unknown) continue;
+          pocket_m2 += cell_m2;
+          left.total_m2 += cell_m2;
+          left.largest_m2 = std::max(left.largest_m2, pocket_m2);
+          if (left.total_m2 >= limit.total_m2 || left.largest_m2 >= limit.largest_m2) return left;
+        }
+      }
+    }
+  }
+  return left;
+}
+
+double ExplorationSpace::reachable_area() const {
+  std::int64_t count = 0;
+  for (std::size_t i = 0; i < flags_.size(); ++i) {
+    count += travel_[i] != kFar && (flags_[i] & kInside) != 0 ? 1 : 0;
   }
   return static_cast<double>(count) * map_.resolution * map_.resolution;
 }

@@ -29,6 +29,11 @@ struct SpaceConfig {
   }
 };
 
+/// Unknown area, m^2, in all and of its largest pocket.
+struct UnknownLeft {
+  double total_m2 = 0, largest_m2 = 0;
+};
+
 /// What one exploration decision needs to know of the map, computed once and then looked up: what
 /// is free or unknown inside the bounds, how far the nearest obstacle is, where the vehicle can go
 /// through known-free space and how far that is, how much is unknown around a point.
@@ -85,6 +90,14 @@ class ExplorationSpace {
   /// information radius of p.
   [[nodiscard]] double unknown_area(const Vec2& p) const;
 
+  /// What may be left to fly to: the unknown cells inside the bounds to which the vehicle's centre
+  /// could come if all that is unknown were free. Never less than what it truly can come to.
+  /// Counting ends where either area has reached its limit.
+  [[nodiscard]] UnknownLeft unknown_left(const UnknownLeft& limit) const;
+
+  /// Area, m^2, of the cells inside the bounds that the vehicle can go to.
+  [[nodiscard]] double reachable_area() const;
+
   /// Whether every cell on the line up to `target` is known-free; the target's own is not looked
   /// at.
   [[nodiscard]] bool sees(const Vec2& from, const Eigen::Vector2i& target) const;
@@ -97,6 +110,8 @@ class ExplorationSpace {
 
   void classify();
   void measure_clearance();
+  /// Whether a cell is as far from obstacles as the vehicle's centre travels.
+  [[nodiscard]] bool is_clear(std::size_t cell) const;
   void find_start(const Vec2& robot);
   /// Nearest cell to p for which `accepts(cell)` holds, within the start reach and on p's side of
   /// any obstacle.

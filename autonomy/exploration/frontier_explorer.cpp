@@ -28,6 +28,9 @@ Decision FrontierExplorer::decide(const OccupancyMap2D& map, const ExplorerInput
     decision.kind = DecisionKind::kStop;
     decision.stop_reason = StopReason::kBattery;
     target_.reset();
+  } else if (little_is_left(space)) {
+    stop(decision, space, StopReason::kLittleLeft);
+    target_.reset();
   } else if (target_) {
     decision.kind = DecisionKind::kKeepTarget;
     set_goal(decision, map);
@@ -42,6 +45,16 @@ Decision FrontierExplorer::decide(const OccupancyMap2D& map, const ExplorerInput
     go_on(decision, space, input);
   }
   return decision;
+}
+
+bool FrontierExplorer::little_is_left(const ExplorationSpace& space) const {
+  if (config_.stop.left_fraction == 0 || !space.has_start() || !space.reaches_flown()) return false;
+  // A pocket that fills the disc of f_I is worth a flight in however large a world.
+  const double radius = config_.space.information_radius_m;
+  const UnknownLeft limit{config_.stop.left_fraction * space.reachable_area(),
+                          M_PI * radius * radius};
+  const UnknownLeft left = space.unknown_left(limit);
+  return left.total_m2 < limit.total_m2 && left.largest_m2 < limit.largest_m2;
 }
 
 void FrontierExplorer::balance(Decision& decision, const ExplorationSpace& space,
@@ -114,7 +127,9 @@ void FrontierExplorer::go_on(Decision& decision, const ExplorationSpace& space,
   choose(decision, space, input);
   if (!decision.winner) {
     const bool ends = !config_.stop.exhaustive || !go_back(decision, space, input);
-    if (ends) stop(decision, space);
+    const bool any = std::any_of(decision.candidates.begin(), decision.candidates.end(),
+                                 [](const auto& c) { return c.verdict == Verdict::kKept; });
+    if (ends) stop(decision, space, any ? StopReason::kLittleLeft : StopReason::kNoCandidates);
     return;
   }
   lost_ways_back_ = 0;
@@ -144,11 +159,9 @@ bool FrontierExplorer::go_back(Decision& decision, const ExplorationSpace& space
   return true;
 }
 
-void FrontierExplorer::stop(Decision& decision, const ExplorationSpace& space) const {
-  const bool any = std::any_of(decision.candidates.begin(), decision.candidates.end(),
-                               [](const auto& c) { return c.verdict == Verdict::kKept; });
+void FrontierExplorer::stop(Decision& decision, const ExplorationSpace& space, StopReason reason) {
   decision.kind = DecisionKind::kStop;
-  decision.stop_reason = any ? StopReason::kLittleLeft : StopReason::kNoCandidates;
+  decision.stop_reason = reason;
   decision.open_frontier_m2 = 0;
   for (const Frontier& frontier : find_frontiers(space)) {
     decision.open_frontier_m2 = std::max(*decision.open_frontier_m2, frontier.unknown_area_m2);

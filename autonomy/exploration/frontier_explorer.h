@@ -57,6 +57,8 @@ class FrontierExplorer : public Explorer {
     Vec2 viewpoint = Vec2::Zero();
   };
 
+  /// Whether what may be left to fly to is not worth going on for.
+  [[nodiscard]] bool little_is_left(const ExplorationSpace& space) const;
   void balance(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input) const;
   TargetEnd settle_target(const ExplorationSpace& space, const ExplorerInput& input);
   /// Whether there still is something to see at a target: enough unknown area, and a border to it.
@@ -65,7 +67,7 @@ class FrontierExplorer : public Explorer {
   /// Back to the nearest place that it flew through, but does not reach any more. @return whether
   /// there is one to try
   bool go_back(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input);
-  void stop(Decision& decision, const ExplorationSpace& space) const;
+  static void stop(Decision& decision, const ExplorationSpace& space, StopReason reason);
   void set_goal(Decision& decision, const OccupancyMap2D& map) const;
 
   ExplorerConfig config_;

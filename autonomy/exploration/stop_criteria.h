@@ -12,7 +12,7 @@ namespace arex {
 enum class StopReason : std::uint8_t {
   kNone,
   kNoCandidates,  ///< none left, and the exhaustive search agrees
-  kLittleLeft,    ///< the unknown area of the best candidates is below the threshold
+  kLittleLeft,    ///< the unknown area of the best candidates, or of all, is below its threshold
   kBattery,       ///< what is left is needed for the way home and the reserve
 };
 inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_candidates",
@@ -20,6 +20,7 @@ inline constexpr std::array<std::string_view, 4> kStopReasonNames{"none", "no_ca
 
 struct StopConfig {
   double min_area_m2 = 0.3;
+  double left_fraction = 0.001;
   bool exhaustive = true;
   double reserve_fraction = 0.2;       ///< 80 % discharge (models/arex/README.md)
   double return_speed_fraction = 0.5;  ///< it brakes and turns on the way
@@ -32,6 +33,9 @@ struct StopConfig {
 
   void fields(auto& f) {
     f("min_area_m2", min_area_m2, "stop when no candidate has more unknown area than this");
+    f("left_fraction", left_fraction,
+      "stop when what is unknown and might be flown to, in all, is less than this part of what can "
+      "be flown to, and no pocket of it fills the disc of f_I; 0: not for that");
     f("exhaustive", exhaustive,
       "before it ends for want of candidates: search the whole map for frontiers, and fly back to "
       "what cannot be reached any more; false: the trees' word ends it (paper)");
@@ -44,6 +48,7 @@ struct StopConfig {
     f("energy_margin", energy_margin, "factor on the energy home: wind, replanning");
     f("detour_factor", detour_factor, "on the straight distance, where no known path leads home");
     f.check(min_area_m2 >= 0, "min_area_m2 >= 0");
+    f.check(left_fraction >= 0 && left_fraction < 1, "left_fraction in [0, 1)");
     f.check(reserve_fraction >= 0 && reserve_fraction < 1, "reserve_fraction in [0, 1)");
     f.check(return_speed_fraction > 0 && return_speed_fraction <= 1,
             "0 < return_speed_fraction <= 1");

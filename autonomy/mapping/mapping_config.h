@@ -91,11 +91,11 @@ struct GlobalMapConfig {
   Vec3 high_m{30, 25, 9};
   double margin_m = 5;
   double range_m = 20;
-  BandReference band = BandReference::kGround;
+  BandReference band = BandReference::kFloor;
   double band_low_m = 0.4;
   double band_high_m = 2.0;
   int min_free_cells = 3;
-  double ground_max_slope = 0.5;
+  double ground_max_slope = 0.7;  ///< a ramp of 35 degrees
   int ground_support = 3;
   SensorModelConfig sensor;  ///< handed down from mapping.sensor
 
@@ -106,8 +106,8 @@ struct GlobalMapConfig {
       "of a box that is not given, along x and y beyond exploration bounds, entry and waypoints");
     f("range_m", range_m, "LiDAR rays count up to here");
     f("band", band,
-      "what the height band of the 2D map stands on: ground, the lowest that was seen; floor, what "
-      "goes on from under the vehicle's way, down ramps and in one of several storeys; absolute, "
+      "what the height band of the 2D map stands on: floor, what goes on from under the vehicle's "
+      "way, down ramps and in one of several storeys; ground, the lowest that was seen; absolute, "
       "O's origin (paper)");
     f("band_low_m", band_low_m,
       "lower edge of the band; over the ground's relief within a tile of 8 cells");

@@ -210,7 +210,7 @@ void derive(ScenarioConfig asked, const worlds::FileWorld* file_world, ScenarioC
   config.scoring.low_m = std::max(config.scoring.low_m, map.low_m.z());
   config.scoring.high_m = std::min(config.scoring.high_m, map.high_m.z());
   CoverageConfig& coverage = config.scoring.coverage;
-  coverage.band_above_terrain = map.band == BandReference::kGround;
+  coverage.band_above_terrain = map.band != BandReference::kAbsolute;
   coverage.band_low_m = map.band_low_m;
   coverage.band_high_m = map.band_high_m;
   coverage.visibility.range_m = asked.stack.mapping.cloud_range_m;

@@ -177,6 +177,85 @@ TEST(ExplorationSpace, UnknownAreaIsThatOfBruteForceInsideThePolygon) {
   }
 }
 
+/// The unknown cells that another space would reach, were they all free: by the flood of a second
+/// map, and their pockets by flooding each.
+TEST(ExplorationSpace, WhatIsLeftIsWhatItWouldReachIfTheUnknownWereFree) {
+  double pockets = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    RandomStream random(seed, "left");
+    const OccupancyMap2D map = test::random_map(90, 70, random);
+    ExplorationBounds bounds{Vec2(-4, -3), Vec2(4, 3.2), {}};
+    if (seed % 2 == 0) bounds.polygon_m = {{-4, -3}, {4, -3.1}, {1.1, 0.4}, {3.9, 3}, {-4.2, 3}};
+    SpaceConfig config;
+    config.travel_radius_m = random.uniform(0.1, 0.4);
+    const ExplorationSpace space(map, bounds, config, Vec2::Zero());
+    if (!space.has_start()) continue;
+    OccupancyMap2D hoped = map;
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        std::int8_t& state = hoped.cells[map.index({x, y})];
+        if (state != OccupancyMap2D::kUnknown) continue;
+        state = bounds.contains(map.centre_of({x, y})) ? OccupancyMap2D::kFree
+                                                       : OccupancyMap2D::kOccupied;
+      }
+    }
+    // Bounds are no obstacle: the clearance is that of the map as it is.
+    const auto may_pass = [&](const Eigen::Vector2i& cell) {
+      return hoped.contains(cell) && hoped.at(cell) == OccupancyMap2D::kFree &&
+             space.clearance(cell) >= config.travel_radius_m - 1e-9;
+    };
+    std::vector<int> piece(map.cells.size(), 0);
+    const auto flood = [&](const Eigen::Vector2i& first, int name, auto&& passes) {
+      std::vector<Eigen::Vector2i> open{first};
+      piece[map.index(first)] = name;
+      int unknown = 0;
+      while (!open.empty()) {
+        const Eigen::Vector2i cell = open.back();
+        open.pop_back();
+        unknown += map.at(cell) == OccupancyMap2D::kUnknown;
+        for (const Eigen::Vector2i& step : {Eigen::Vector2i(1, 0), Eigen::Vector2i(-1, 0),
+                                            Eigen::Vector2i(0, 1), Eigen::Vector2i(0, -1)}) {
+          const Eigen::Vector2i next = cell + step;
+          if (!passes(next) || piece[map.index(next)] == name) continue;
+          piece[map.index(next)] = name;
+          open.push_back(next);
+        }
+      }
+      return 0.01 * unknown;
+    };
+    double total = 0;
+    for (int y = 0, known = 1; y < map.height && known == 1; ++y) {
+      for (int x = 0; x < map.width && known == 1; ++x) {
+        if (!space.is_reachable({x, y}) || !may_pass({x, y})) continue;
+        total = flood({x, y}, 1, may_pass);
+        known = 2;
+      }
+    }
+    double largest = 0;
+    int name = 2;
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        if (piece[map.index({x, y})] != 1 || space.is_reachable({x, y})) continue;
+        largest = std::max(largest, flood({x, y}, name++, [&](const Eigen::Vector2i& cell) {
+                             return may_pass(cell) && !space.is_reachable(cell);
+                           }));
+        ++pockets;
+      }
+    }
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    const UnknownLeft left = space.unknown_left({kNone, kNone});
+    EXPECT_NEAR(left.total_m2, total, 1e-9) << "seed " << seed;
+    EXPECT_NEAR(left.largest_m2, largest, 1e-9) << "seed " << seed;
+    if (total > 0.5) {
+      EXPECT_NEAR(space.unknown_left({0.5, kNone}).total_m2, 0.5, 1e-9);
+    }
+    if (largest > 0.2) {
+      EXPECT_NEAR(space.unknown_left({kNone, 0.2}).largest_m2, 0.2, 1e-9);
+    }
+  }
+  EXPECT_GT(pockets, 20);
+}
+
 TEST(ExplorationBounds, APolygonNarrowsTheBox) {
   const ExplorationBounds bounds{Vec2(-2, -2), Vec2(2, 2), {{-3, -3}, {3, -3}, {0, 1}}};
   EXPECT_TRUE(bounds.contains({0, 0}));

@@ -78,8 +78,10 @@ class GridWorld {
   double flown_ = 0;
 };
 
+/// Explores to the end: whatever is worth a target is flown to.
 ExplorerConfig light() {
   ExplorerConfig config;
+  config.stop.left_fraction = 0;
   config.detector.local_iterations = 300;
   config.detector.global_iterations = 500;
   return config;
@@ -279,6 +281,7 @@ TEST(Explorer, ReachedButStillUnknownIsAStrike) {
 TEST(Explorer, StopsWhenLittleIsLeft) {
   Hall hall;
   test::fill(hall.map, {150, 1}, {198, 78}, OccupancyMap2D::kFree);
+  hall.config.filter.min_gain_m2 = 0.2;
   test::fill(hall.map, {150, 40}, {154, 44}, OccupancyMap2D::kUnknown);  // 0.25 m^2
   RevenueExplorer explorer(hall.config, 0.1, 1);
   const Decision d = explorer.decide(hall.map, hall.input);
@@ -290,6 +293,46 @@ TEST(Explorer, StopsWhenLittleIsLeft) {
   test::fill(hall.map, {150, 40}, {154, 44}, OccupancyMap2D::kFree);
   EXPECT_EQ(RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input).stop_reason,
             StopReason::kNoCandidates);
+}
+
+TEST(Explorer, StopsWhenTheRestOfTheAreaIsSmall) {
+  Hall hall;
+  test::fill(hall.map, {1, 1}, {198, 78}, OccupancyMap2D::kFree);
+  const auto decide = [&](double left_fraction) {
+    hall.config.stop.left_fraction = left_fraction;
+    return RevenueExplorer(hall.config, 0.1, 1).decide(hall.map, hall.input);
+  };
+  // A crumb of 0.8 m^2 of some 150 m^2 that it can fly to: enough for a target, but not of the
+  // whole.
+  test::fill(hall.map, {150, 40}, {159, 47}, OccupancyMap2D::kUnknown);
+  EXPECT_EQ(decide(0).kind, DecisionKind::kNewTarget);
+  EXPECT_EQ(decide(0.004).kind, DecisionKind::kNewTarget);
+  const Decision stop = decide(0.007);
+  EXPECT_EQ(stop.kind, DecisionKind::kStop);
+  EXPECT_EQ(stop.stop_reason, StopReason::kLittleLeft);
+  // What no vehicle could come to, round which walls stand, does not keep it.
+  test::fill(hall.map, {149, 39}, {160, 48}, OccupancyMap2D::kOccupied);
+  test::fill(hall.map, {150, 40}, {159, 47}, OccupancyMap2D::kUnknown);
+  EXPECT_EQ(decide(1e-6).kind, DecisionKind::kStop);
+  // A pocket that fills the disc of f_I is flown to, whatever its share.
+  test::fill(hall.map, {140, 30}, {165, 60}, OccupancyMap2D::kFree);
+  test::fill(hall.map, {150, 40}, {167, 57}, OccupancyMap2D::kUnknown);  // 3.24 m^2
+  EXPECT_EQ(decide(0.5).kind, DecisionKind::kNewTarget);
+}
+
+TEST(Explorer, LeavesNoMoreOfAMazeThanItIsTold) {
+  double flown_to_the_end = 0, flown = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    ExplorerConfig config = light();
+    config.stop.left_fraction = 0.02;
+    const Flight flight = explore(seed, config);
+    EXPECT_EQ(flight.last.kind, DecisionKind::kStop);
+    EXPECT_GE(flight.known, 1 - config.stop.left_fraction) << "seed " << seed;
+    flown += flight.flown_m;
+    config.stop.left_fraction = 0;
+    flown_to_the_end += explore(seed, config).flown_m;
+  }
+  EXPECT_LT(flown, flown_to_the_end);
 }
 
 TEST(Explorer, StopsForTheBatteryByTheKnownWayHome) {

@@ -18,6 +18,7 @@ constexpr double kResolution = 0.1;
 
 GlobalMapConfig room_config() {
   GlobalMapConfig config;
+  config.band = BandReference::kGround;  // nobody flies here whose way a floor could go on from
   config.low_m = {-9.3, -7.7, -2.1};
   config.high_m = {10.1, 8.4, 4.6};
   config.range_m = 8;
@@ -173,6 +174,7 @@ class Painter {
 
 GlobalMapConfig scene_config() {
   GlobalMapConfig config;
+  config.band = BandReference::kGround;
   config.low_m = {-8, -8, -3};
   config.high_m = {8, 8, 5};
   return config;
@@ -292,6 +294,7 @@ TEST(GlobalMap, FollowsATiltedFloorUnderACeiling) {
   GlobalMapConfig config;
   config.low_m = {-20, -4, -11};
   config.high_m = {20, 4, -2};
+  config.band = BandReference::kGround;
   config.band_low_m = 0.5;
   config.band_high_m = 2.0;
   config.ground_max_slope = 0.03;

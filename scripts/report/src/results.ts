@@ -115,10 +115,11 @@ export class Results {
       .filter((i) => Object.entries(values).every(([key, value]) => this.levelOf.get(key)?.[i] === value));
   }
 
-  estimate(rows: number[], figure: string): Estimate {
+  estimate(rows: number[], figure: string, confidence = 0.95): Estimate {
     const { factor } = this.display(figure);
     const values = rows.map((i) => this.value(i, figure)).filter((value) => value !== null);
-    return figure === SUCCESS ? scaled(estimateShare(values), factor) : estimateMean(values.map((value) => factor * value));
+    return figure === SUCCESS ? scaled(estimateShare(values, confidence), factor)
+      : estimateMean(values.map((value) => factor * value), confidence);
   }
 
   /** Every combination of the factors' values that was flown. */

@@ -1,12 +1,5 @@
 // Means with what is known about them.
 
-/** Two-sided 95 % quantiles of Student's t by degrees of freedom, from 1. */
-const T_95 = [
-  12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.16, 2.145, 2.131,
-  2.12, 2.11, 2.101, 2.093, 2.086, 2.08, 2.074, 2.069, 2.064, 2.06, 2.056, 2.052, 2.048, 2.045, 2.042,
-];
-const Z_95 = 1.95996;
-
 /** Fewer values than this are shown as they are: an interval from two says next to nothing. */
 export const LEAST_FOR_INTERVAL = 3;
 
@@ -14,34 +7,59 @@ export interface Estimate {
   n: number;
   values: number[];
   mean: number;
-  /** 95 % confidence interval; NaN where the values are too few to tell. */
+  /** Confidence interval, of 95 % unless told otherwise; NaN where the values are too few to tell. */
   low: number;
   high: number;
 }
 
-function quantile(freedom: number): number {
-  // Beyond the table, Cornish and Fisher's first term.
-  return T_95[freedom - 1] ?? Z_95 * (1 + (Z_95 * Z_95 + 1) / (4 * freedom));
+/** Probability that Student's t lies within -x..x, by its finite series (Abramowitz and Stegun 26.7.3, 26.7.4). */
+function studentWithin(x: number, freedom: number): number {
+  const angle = Math.atan2(x, Math.sqrt(freedom));
+  const cos2 = Math.cos(angle) ** 2;
+  const odd = freedom % 2 === 1;
+  let term = odd ? Math.cos(angle) : 1;
+  let sum = freedom === 1 ? 0 : term;
+  for (let k = odd ? 3 : 2; k <= freedom - 2; k += 2) {
+    term *= ((k - 1) / k) * cos2;
+    sum += term;
+  }
+  return odd ? (2 / Math.PI) * (angle + Math.sin(angle) * sum) : Math.sin(angle) * sum;
+}
+
+/** What Student's t of so many degrees of freedom, 1 or more, lies within with this probability. */
+export function studentQuantile(confidence: number, freedom: number): number {
+  let [low, high] = [0, 1];
+  while (studentWithin(high, freedom) < confidence) high *= 2;
+  for (let k = 0; k < 60; ++k) {
+    const middle = (low + high) / 2;
+    [low, high] = studentWithin(middle, freedom) < confidence ? [middle, high] : [low, middle];
+  }
+  return (low + high) / 2;
+}
+
+/** The same of the normal distribution, which Student's is to 1e-4 with so much freedom. */
+function normalQuantile(confidence: number): number {
+  return studentQuantile(confidence, 10000);
 }
 
 /** Mean of independent values and its interval after Student. */
-export function estimateMean(values: number[]): Estimate {
+export function estimateMean(values: number[], confidence = 0.95): Estimate {
   const n = values.length;
   const mean = values.reduce((sum, value) => sum + value, 0) / n;
   if (n < LEAST_FOR_INTERVAL) return { n, values, mean, low: NaN, high: NaN };
   const variance = values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / (n - 1);
-  const half = quantile(n - 1) * Math.sqrt(variance / n);
+  const half = studentQuantile(confidence, n - 1) * Math.sqrt(variance / n);
   return { n, values, mean, low: mean - half, high: mean + half };
 }
 
 /** A share of yes and no, with Wilson's interval. */
-export function estimateShare(values: number[]): Estimate {
+export function estimateShare(values: number[], confidence = 0.95): Estimate {
   const n = values.length;
   const mean = values.reduce((sum, value) => sum + value, 0) / n;
   if (n < LEAST_FOR_INTERVAL) return { n, values, mean, low: NaN, high: NaN };
-  const z2 = Z_95 * Z_95;
-  const centre = (mean + z2 / (2 * n)) / (1 + z2 / n);
-  const half = (Z_95 / (1 + z2 / n)) * Math.sqrt((mean * (1 - mean)) / n + z2 / (4 * n * n));
+  const z = normalQuantile(confidence);
+  const centre = (mean + (z * z) / (2 * n)) / (1 + (z * z) / n);
+  const half = (z / (1 + (z * z) / n)) * Math.sqrt((mean * (1 - mean)) / n + (z * z) / (4 * n * n));
   return { n, values, mean, low: centre - half, high: centre + half };
 }
 

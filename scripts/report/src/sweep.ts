@@ -178,11 +178,14 @@ function sideBySide(results: Results, section: HTMLElement): void {
   const names = configurations.map((c) => c.name);
   const chosen = [names[0], names[names.length - 1]];
   const box = element('div', { class: 'scroll' });
+  // Whoever looks at each pair judges so often: Bonferroni's share of the 5 % for each.
+  const pairs = (names.length * (names.length - 1)) / 2;
+  const confidence = 1 - 0.05 / pairs;
   const draw = () => {
     const [a, b] = chosen.map((name) => results.where(configurations[names.indexOf(name)].values));
     const body = element('tbody');
     for (const figure of results.figures) {
-      const row = comparisonRow(results, figure, a, b);
+      const row = comparisonRow(results, figure, a, b, confidence);
       if (row) body.append(row);
     }
     const successes = (rows: number[]) => element('small', {}, ` ${results.successes(rows)} succeeded`);
@@ -198,8 +201,9 @@ function sideBySide(results: Results, section: HTMLElement): void {
     box,
     element('p', { class: 'note' },
       `Mean (95 % confidence interval) of the runs that succeeded; fewer than ${LEAST_FOR_INTERVAL} values are shown as they ` +
-      'are and not judged. Differences are taken seed by seed where both succeeded; one whose interval leaves zero out is ' +
-      'marked. Among many figures, one in twenty does so by chance.'),
+      'are and not judged. Differences are taken seed by seed where both succeeded' +
+      (pairs > 1 ? `, and their intervals hold for all ${pairs} pairs of configurations together (Bonferroni)` : '') +
+      '; one whose interval leaves zero out is marked. Among many figures, one in twenty does so by chance.'),
   );
   draw();
 }
@@ -238,21 +242,23 @@ function partners(results: Results, figure: string, rows: number[]): Map<string,
   return found;
 }
 
-function difference(results: Results, figure: string, a: number[], b: number[]): Estimate {
+function difference(results: Results, figure: string, a: number[], b: number[], confidence: number): Estimate {
   if (figure === SUCCESS) {
-    const [share_a, share_b] = [a, b].map((rows) => scaled(results.estimate(rows, figure), 1 / 100));
+    const [share_a, share_b] = [a, b].map((rows) => scaled(results.estimate(rows, figure, confidence), 1 / 100));
     return scaled(shareDifference(share_a, share_b), 100);
   }
   const { factor } = results.display(figure);
   const before = partners(results, figure, a);
   const after = partners(results, figure, b);
-  return estimateMean([...after].flatMap(([id, value]) => (before.has(id) ? [factor * (value - before.get(id)!)] : [])));
+  return estimateMean([...after].flatMap(([id, value]) => (before.has(id) ? [factor * (value - before.get(id)!)] : [])), confidence);
 }
 
-function comparisonRow(results: Results, figure: string, a: number[], b: number[]): HTMLElement | null {
+function comparisonRow(
+  results: Results, figure: string, a: number[], b: number[], confidence: number,
+): HTMLElement | null {
   const [of_a, of_b] = [results.estimate(a, figure), results.estimate(b, figure)];
   if (of_a.n === 0 && of_b.n === 0) return null;
-  const change = difference(results, figure, a, b);
+  const change = difference(results, figure, a, b, confidence);
   const significant = change.low > 0 || change.high < 0;
   const better = Math.sign(change.mean) * results.info(figure).better;
   const mark = !significant ? '' : better > 0 ? 'better' : better < 0 ? 'worse' : 'differs';

@@ -138,8 +138,10 @@ void Autopilot::update_state(Stamp now) {
 
 void Autopilot::update_flight(Stamp now, bool follow) {
   using enum AutopilotState;
-  const LandDetector::Stage stage = land_detector_.update(
-      now, {support_n_, thrust_setpoint_n_, ahrs_.velocity().z(), rate_B_.norm()});
+  std::optional<double> vertical_speed;
+  if (!health_.barometer_silent()) vertical_speed = ahrs_.velocity().z();
+  const LandDetector::Stage stage =
+      land_detector_.update(now, {support_n_, thrust_setpoint_n_, vertical_speed, rate_B_.norm()});
   contact_ = stage != LandDetector::Stage::kAirborne;
   // The integrators would wind up against the feet.
   if (contact_) rate_control_.reset(rate_B_);

@@ -37,6 +37,8 @@ struct HealthConfig {
   double weak_pack_factor = 1.8;           ///< a worn cell of four has some ten times a sound one's
   double field_step_gauss = 0.05;  ///< RMS between readings 5 ms apart; the fastest turn gives 0.01
   double pressure_step_pa = 8;  ///< RMS between readings 20 ms apart; climbing at 2 m/s gives 0.5
+  double voltage_step_v =
+      0.35;  ///< RMS between power readings 10 ms apart; a 10 A step is 0.28 once
 
   void fields(auto& f) {
     f("vibration", vibration, "when the airframe is called shaking");
@@ -51,9 +53,12 @@ struct HealthConfig {
     f("pressure_step_pa", pressure_step_pa,
       "RMS change between barometer readings that is called noise");
     f.check(tilt_limit_rad > 0 && tilt_s >= 0, "tilt_limit_rad > 0, tilt_s >= 0");
+    f("voltage_step_v", voltage_step_v,
+      "RMS change between power readings' voltages that is called noise");
     f.check(pack_resistance_ohm > 0, "pack_resistance_ohm > 0");
     f.check(weak_pack_factor > 1, "weak_pack_factor > 1");
-    f.check(field_step_gauss > 0 && pressure_step_pa > 0, "field_step_gauss, pressure_step_pa > 0");
+    f.check(field_step_gauss > 0 && pressure_step_pa > 0 && voltage_step_v > 0,
+            "field_step_gauss, pressure_step_pa, voltage_step_v > 0");
   }
 };
 

@@ -29,7 +29,8 @@ HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& 
       vibration_(config.vibration, kFlightImuHz),
       motors_(config.motor, mix, weight_n),
       field_("magnetometer", config.field_step_gauss),
-      pressure_("barometer", config.pressure_step_pa) {}
+      pressure_("barometer", config.pressure_step_pa),
+      voltage_("power", config.voltage_step_v) {}
 
 void HealthMonitor::add_imu(Stamp now, const ImuSample& imu) {
   const Vec3 &w = imu.gyro_radps, &a = imu.accel_mps2;
@@ -49,6 +50,7 @@ void HealthMonitor::add_barometer(Stamp now, const BarometerSample& sample) {
 
 void HealthMonitor::add_battery(Stamp now, const BatterySample& sample) {
   power_.add(now, sample.stamp, std::array{sample.voltage_v, sample.current_a});
+  voltage_.add(Vec3(sample.voltage_v, 0, 0));
   pack_.add(sample);
 }
 
@@ -56,6 +58,7 @@ void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {
   watch_streams(now, flight.in_air);
   watch_noise(now, field_);
   watch_noise(now, pressure_);
+  watch_noise(now, voltage_);
   // On the ground the motors idle, and hands may shake it.
   const auto shaken = vibration_.update();
   if (shaken && flight.armed) report(now, EventKind::kVibration, "autopilot: " + *shaken);

@@ -41,6 +41,8 @@ class HealthMonitor {
 
   [[nodiscard]] const MotorWatch& motors() const { return motors_; }
   [[nodiscard]] const VibrationWatch& vibration() const { return vibration_; }
+  /// Whether nothing tells the height, and the vertical speed is the integral of the IMU's errors.
+  [[nodiscard]] bool barometer_silent() const { return barometer_.silent(); }
   /// RMS of a barometer reading that was told to be noisy, Pa; 0 of a sound one.
   [[nodiscard]] double pressure_noise_pa() const;
 
@@ -56,7 +58,7 @@ class HealthMonitor {
   VibrationWatch vibration_;
   MotorWatch motors_;
   PackWatch pack_;
-  NoiseWatch field_, pressure_;
+  NoiseWatch field_, pressure_, voltage_;
   double tilted_s_ = 0;
   bool tilt_told_ = false;
   bool pack_told_ = false;

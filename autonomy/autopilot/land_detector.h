@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include "autopilot/autopilot_config.h"
 #include "messages/vehicle.h"
@@ -19,7 +20,9 @@ class LandDetector {
   struct Evidence {
     double support_n = 0;  ///< specific force along B's z times mass, less the rotors' thrust
     double demanded_thrust_n = 0;
-    double vertical_speed_mps = 0;
+    /// None where nothing measures it. A falling vehicle's drag would have to pass for the support
+    /// then: 0.2 of this one's weight at 11 m/s.
+    std::optional<double> vertical_speed_mps;
     double rate_radps = 0;  ///< norm of the body rate
   };
 
@@ -27,8 +30,9 @@ class LandDetector {
       : config_(config), weight_n_(vehicle.mass_kg * kGravity) {}
 
   Stage update(Stamp now, const Evidence& evidence) {
-    const bool contact = evidence.support_n > config_.contact_fraction * weight_n_ &&
-                         std::abs(evidence.vertical_speed_mps) < config_.still_speed_mps;
+    const bool contact =
+        evidence.support_n > config_.contact_fraction * weight_n_ &&
+        std::abs(evidence.vertical_speed_mps.value_or(0)) < config_.still_speed_mps;
     const bool resting = contact && evidence.support_n > config_.support_fraction * weight_n_ &&
                          evidence.demanded_thrust_n < config_.low_thrust_fraction * weight_n_ &&
                          evidence.rate_radps < config_.still_rate_radps;

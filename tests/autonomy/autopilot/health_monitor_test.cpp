@@ -117,5 +117,27 @@ TEST(HealthMonitor, KnowsANoisyBarometerFromOneThatClimbs) {
   EXPECT_EQ(told(30, 0), "barometer noisy;");
 }
 
+TEST(HealthMonitor, KnowsANoisyPowerSensorFromALoadThatChanges) {
+  const auto told = [](double noise_v, double step_a, int every) {
+    HealthMonitor monitor(HealthConfig{}, kAllocation.mix(), kWeight);
+    RandomStream noise(6, "power");
+    std::string text;
+    for (int i = 0; i < 1000; ++i) {
+      const Stamp now = i * 10 * kNanosecondsPerTick;
+      const double current_a = 18 + (i / every % 2 == 0 ? 0 : step_a);
+      const double voltage_v = 15.6 - 0.028 * current_a + noise_v * noise.normal();
+      monitor.add_battery(now, {now, voltage_v, current_a});
+      monitor.update(now, {}, 0.01);
+      for (const Event& event : monitor.take_notices()) {
+        if (event.kind == EventKind::kSensorFault) text += event.detail + ";";
+      }
+    }
+    return text;
+  };
+  EXPECT_EQ(told(0.01, 0, 1), "");
+  EXPECT_EQ(told(0.01, 15, 5), "");  // full thrust and back, ten times a second
+  EXPECT_EQ(told(0.5, 0, 1), "power noisy;");
+}
+
 }  // namespace
 }  // namespace arex

@@ -16,9 +16,16 @@ namespace arex {
 namespace {
 
 constexpr double kLeastInformation = 1e-9;  // keeps the algebra regular
+constexpr double kLeastFeigned = 1e-3;      // likewise: 30 m, 30 rad
+
+using PoseVector = Eigen::Matrix<double, 6, 1>;
 
 struct Linearisation {
-  PoseInformation information;
+  PoseCovariance A = PoseCovariance::Zero();  ///< H^T V^-1 H by the pose
+  PoseVector b = PoseVector::Zero();          ///< H^T V^-1 r
+  /// What the errors of the normals alone are expected to add to A and to b.
+  PoseCovariance feigned = PoseCovariance::Zero();
+  PoseVector pull = PoseVector::Zero();
   int matched = 0;
   double sum_squared_sigma = 0;
   std::vector<int> born;  ///< of the matched surfels
@@ -32,13 +39,15 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
   const double gate2 = rc.gate_sigma * rc.gate_sigma;
   const double robust2 = rc.robust_sigma * rc.robust_sigma;
   const Pose X_OL = x.X_OB() * x.X_BL;
+  const Mat3 R_BO = x.R_OB.transpose();
   constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
   Linearisation sum;
   sum.born.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ScanPoint& point = points[i];
     if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
-    const auto match = map.find(X_OL * point.p_L.cast<double>());
+    const Vec3 p_O = X_OL * point.p_L.cast<double>();
+    const auto match = map.find(p_O);
     if (!match) continue;
     const PlaneResidual residual = plane_residual(x, point, *match, config.lidar);
     const double r2 = residual.r * residual.r;
@@ -50,11 +59,62 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
     sum.sum_squared_sigma += sigma2;
     const double weight =
         1 / ((1 + sigma2 / robust2) * rc.variance_inflation * residual.variance_m2);
-    const PoseInformation::Vector weighted = weight * residual.h;
-    sum.information.A.noalias() += weighted * residual.h.transpose();
-    sum.information.b += residual.r * weighted;
+    const PoseVector h = residual.h.head<6>();
+    const PoseVector weighted = weight * h;
+    sum.A.noalias() += weighted * h.transpose();
+    sum.b += residual.r * weighted;
+    // h = G n and r = n . (p_O - mean) share the normal, and with it its error.
+    Eigen::Matrix<double, 6, 3> G;
+    G.topRows<3>() = so3::hat(x.X_BL * point.p_L.cast<double>()) * R_BO;
+    G.bottomRows<3>().setIdentity();
+    const Eigen::Matrix<double, 6, 3> GS = G * (weight * match->normal_covariance);
+    sum.feigned.noalias() += GS * G.transpose();
+    sum.pull.noalias() += GS * (p_O - match->mean);
   }
   return sum;
+}
+
+/// Takes off what the errors of the normals feign. A surface holds the pose along its normal n; of
+/// a normal that errs by e, the sum w h h^T also gets w G e e^T G^T, which does not average out:
+/// over thousands of points it grows into a hold in directions that no surface faces, and r into a
+/// pull towards where the points of the map lay in their cells. With A = M + N, N of the errors
+/// alone, what is left to solve is M x = -(b - pull). Its solution has the covariance M^-1 A M^-1:
+/// the information is M A^-1 M = T A T^T and its right side T (b - pull), with T = M A^-1 = I - N
+/// A^-1, taken for nil in the directions where A is not more than N.
+///
+/// Source: Fuller, Measurement Error Models, 1987, 2.2: least squares corrected for the attenuation
+/// that errors in the regressors cause.
+void take_off_feigned(Linearisation& sum) {
+  const PoseCovariance N = sum.feigned + kLeastFeigned * PoseCovariance::Identity();
+  const PoseCovariance L = N.llt().matrixL();
+  const PoseCovariance L_inverse = L.inverse();
+  // A in units of N: the eigenvalue 1 is nothing but error.
+  const PoseCovariance ratio = L_inverse * sum.A * L_inverse.transpose();
+  const Eigen::SelfAdjointEigenSolver<PoseCovariance> solver(0.5 * (ratio + ratio.transpose()));
+  const PoseVector lambda = solver.eigenvalues().cwiseMax(1);
+  const PoseVector kept = (1 - lambda.cwiseInverse().array()).matrix();
+  const PoseCovariance LV = L * solver.eigenvectors();
+  const PoseVector along = solver.eigenvectors().transpose() * L_inverse * (sum.b - sum.pull);
+  const PoseCovariance root = LV * kept.cwiseProduct(lambda.cwiseSqrt()).asDiagonal();
+  sum.A = root * root.transpose();
+  sum.b = LV * kept.cwiseProduct(along);
+}
+
+/// What is known of the pose, as information on it and the extrinsics. All that a scan says is how
+/// the LiDAR stands to the map, so a residual's derivative by the extrinsics follows from that by
+/// the pose: p_L x n_L = R_BL^T (p_B x n_B - p_BL x n_B) and n_B = R_OB^T n.
+PoseInformation with_extrinsics(const Linearisation& sum, const NavigationState& x) {
+  const Mat3 R_BO = x.R_OB.transpose(), R_LB = x.X_BL.R.transpose();
+  Eigen::Matrix<double, PoseInformation::kDim, 6> K;
+  K.topRows<6>().setIdentity();
+  K.block<3, 3>(6, 0) = R_LB;
+  K.block<3, 3>(6, 3) = -R_LB * so3::hat(x.X_BL.p) * R_BO;
+  K.block<3, 3>(9, 0).setZero();
+  K.block<3, 3>(9, 3) = R_BO;
+  PoseInformation information;
+  information.A = K * sum.A * K.transpose();
+  information.b = K * sum.b;
+  return information;
 }
 
 /// Adds the variance of an angle between IMU and LiDAR to that of the residuals' rotation, A^-1:
@@ -70,10 +130,12 @@ PoseInformation with_shaking(const PoseInformation& information, double std_rad)
   return shaken;
 }
 
-/// What is left of a block's information once the other block is unknown too, as deviations.
+/// What is left of a block's information once the other block is unknown too, as deviations. Of
+/// that one a radian or a metre is known, or in what a scan leaves open the least coupling would
+/// hide all.
 void block_deviations(const Mat3& own, const Mat3& cross, const Mat3& other, Vec3& deviations,
                       Vec3& worst_axis) {
-  const Mat3 regular = other + kLeastInformation * Mat3::Identity();
+  const Mat3 regular = other + Mat3::Identity();
   const Mat3 schur = own - cross * regular.inverse() * cross.transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (schur + schur.transpose()));
   deviations = solver.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse().cwiseSqrt();
@@ -137,7 +199,8 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
     at_x = linearise(points, map, config, x, P_pose);
     ++report.iterations;
     if (at_x.matched < config.health.min_matches) break;
-    seen = with_shaking(at_x.information, shaken_rad);
+    take_off_feigned(at_x);
+    seen = with_shaking(with_extrinsics(at_x, x), shaken_rad);
     const NavigationState next = filter.iterate(x, seen);
     const ErrorVector step = local(x, next);
     x = next;
@@ -149,23 +212,24 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
   report.matched = at_x.matched;
   if (at_x.matched > 0) {
     report.residual_rms_sigma = std::sqrt(at_x.sum_squared_sigma / at_x.matched);
-    const PoseInformation::Matrix& A = at_x.information.A;
+    const PoseCovariance& A = at_x.A;
     const Mat3 rr = A.block<3, 3>(0, 0), rp = A.block<3, 3>(0, 3), pp = A.block<3, 3>(3, 3);
     block_deviations(pp, rp.transpose(), rr, report.position_std_m, report.worst_position_axis_O);
     block_deviations(rr, rp, pp, report.rotation_std_rad, report.worst_rotation_axis_B);
-    const PoseCovariance own =
-        A.topLeftCorner<6, 6>() + kLeastInformation * PoseCovariance::Identity();
-    report.covariance = own.ldlt().solve(PoseCovariance::Identity());
     report.born = std::move(at_x.born);
   }
   report.accepted =
       at_x.matched >= config.health.min_matches &&
       at_x.matched >= config.health.min_match_fraction * static_cast<double>(points.size());
   if (report.accepted) {
-    const Eigen::Matrix<double, 6, 1> d = local(filter.state(), x).head<6>();
-    const Eigen::Matrix<double, 6, 6> P = P_pose.topLeftCorner<6, 6>();
+    const PoseVector d = local(filter.state(), x).head<6>();
+    const PoseCovariance P = P_pose.topLeftCorner<6, 6>();
     report.innovation = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
     filter.finish(x, seen);
+    // The gain M gives this scan's noise the covariance M A' M, M being the posterior covariance.
+    const PoseCovariance posterior = filter.pose_covariance().topLeftCorner<6, 6>();
+    report.covariance = posterior * at_x.A * posterior;
+    report.carried = posterior - report.covariance;
   }
   return report;
 }

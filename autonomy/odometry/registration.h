@@ -7,7 +7,8 @@
 #include "odometry/surfel_map.h"
 #include "odometry/undistortion.h"
 
-/// The iterated update of the filter by one undistorted scan: point to plane against the map.
+/// The iterated update of the filter by one undistorted scan: point to plane against the map, the
+/// surfels' normals taken for what they are, measured with an error.
 namespace arex {
 
 /// How one scan met the map.
@@ -23,7 +24,10 @@ struct RegistrationReport {
   Vec3 rotation_std_rad = Vec3::Zero();
   Vec3 worst_position_axis_O = Vec3::UnitZ();
   Vec3 worst_rotation_axis_B = Vec3::UnitZ();
-  PoseCovariance covariance = PoseCovariance::Zero();  ///< that this scan alone leaves; X_BL known
+  /// Of the corrected pose's error, in B and O: what came of this scan's noise, and what the prior
+  /// brought. Together the filter's; nil if it was not corrected.
+  PoseCovariance covariance = PoseCovariance::Zero();
+  PoseCovariance carried = PoseCovariance::Zero();
   std::vector<int> born;  ///< of the surfels of the matched points, at the last iterate
 };
 

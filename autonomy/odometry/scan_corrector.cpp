@@ -14,7 +14,7 @@ namespace {
 constexpr Stamp kShakenFor = kNanosecondsPerSecond;
 /// A surfel's own error is the same for scan after scan and does not average out with their noise.
 /// So much more than that noise it leaves in the map, by the NEES of flights.
-constexpr double kSharedError = 14;
+constexpr double kSharedError = 28;
 
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
   std::vector<float> fractions;
@@ -85,6 +85,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
         insert(points, points_O);
         drift_.add(map_met_,
                    kSharedError * turned(update.registration.covariance, filter_.state().R_OB) +
+                       turned(update.registration.carried, filter_.state().R_OB) +
                        distortion(filter_.noise(), to_seconds(job.scan->end - job.scan->stamp)),
                    filter_.state().p_OB);
       }

@@ -15,8 +15,9 @@ struct SurfelMatch {
   Vec3 mean = Vec3::Zero();     ///< of the surfel's points, in O, m
   double variance_m2 = 0;  ///< of the surface's height along the normal at the query: thickness
                            ///< and the fit's own variance
-  int level = 0;           ///< 0: the finest
-  int born = 0;            ///< the insertion that began its cell
+  Mat3 normal_covariance = Mat3::Zero();  ///< of the normal's error, in O
+  int level = 0;                          ///< 0: the finest
+  int born = 0;                           ///< the insertion that began its cell
 };
 
 /// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell

@@ -72,12 +72,15 @@ std::optional<Answer> brute_force(const Cloud& cloud, const SurfelMapConfig& con
     const double s2 = (n * solver.eigenvalues()[0] + 3 * n / W) / n;
     if (std::sqrt(s2) > config.max_thickness_ratio * edge) continue;
     double variance = s2 * (1 + 1 / n);
+    Mat3 normal_covariance = Mat3::Zero();
     for (int k = 1; k < 3; ++k) {
-      const double d = solver.eigenvectors().col(k).dot(q - mean);
-      variance += s2 * d * d / (n * solver.eigenvalues()[k]);
+      const Vec3 axis = solver.eigenvectors().col(k);
+      const double tilt = s2 / (n * solver.eigenvalues()[k]);
+      variance += tilt * std::pow(axis.dot(q - mean), 2);
+      normal_covariance += tilt * axis * axis.transpose();
     }
     if (!best || variance < best->variance_m2) {
-      best = SurfelMatch{solver.eigenvectors().col(0), mean, variance, l};
+      best = SurfelMatch{solver.eigenvectors().col(0), mean, variance, normal_covariance, l};
     }
   }
   if (!best) return std::nullopt;
@@ -116,6 +119,8 @@ TEST(SurfelMap, AnswersLikeBruteForce) {
       EXPECT_LT((actual->mean - match.mean).norm(), 1e-5);
       EXPECT_GT(std::abs(actual->normal.dot(match.normal)), 1 - 1e-5);
       EXPECT_NEAR(actual->variance_m2 / match.variance_m2, 1, 2e-3);
+      EXPECT_LT((actual->normal_covariance - match.normal_covariance).norm(),
+                2e-3 * match.normal_covariance.norm());
     }
     EXPECT_GT(answered, 150);
     EXPECT_GT(silent, 10);

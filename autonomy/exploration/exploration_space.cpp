@@ -204,39 +204,44 @@ double ExplorationSpace::unknown_area(const Vec2& p) const {
   return static_cast<double>(count) * map_.resolution * map_.resolution;
 }
 
-UnknownLeft ExplorationSpace::unknown_left(const UnknownLeft& limit) const {
+template <class Accepts>
+double ExplorationSpace::flood_unknown(std::vector<Eigen::Vector2i> open, double enough_m2,
+                                       Accepts&& accepts) const {
   const std::array<Eigen::Vector2i, 4> sides{Eigen::Vector2i{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  const double cell_m2 = map_.resolution * map_.resolution;
   std::vector<bool> met(flags_.size());
-  std::vector<Eigen::Vector2i> open;
-  UnknownLeft left;
-  for (int y = 0; y < map_.height; ++y) {
-    for (int x = 0; x < map_.width; ++x) {
-      if (travel_[map_.index({x, y})] == kFar) continue;
-      open.emplace_back(x, y);
-      double pocket_m2 = 0;
-      while (!open.empty()) {
-        const Eigen::Vector2i cell = open.back();
-        open.pop_back();
-        for (const Eigen::Vector2i& side : sides) {
-          const Eigen::Vector2i next = cell + side;
-          if (!map_.contains(next)) continue;
-          const std::size_t to = map_.index(next);
-          const bool unknown = (flags_[to] & kUnknown) != 0;
-          const bool may_be_passed = unknown || (flags_[to] & kFree) != 0;
-          if (met[to] || travel_[to] != kFar || !may_be_passed || !is_clear(to)) continue;
-          met[to] = true;
-          open.push_back(next);
-          if (!unknown) continue;
-          pocket_m2 += cell_m2;
-          left.total_m2 += cell_m2;
-          left.largest_m2 = std::max(left.largest_m2, pocket_m2);
-          if (left.total_m2 >= limit.total_m2 || left.largest_m2 >= limit.largest_m2) return left;
-        }
-      }
+  for (const Eigen::Vector2i& cell : open) met[map_.index(cell)] = true;
+  double unknown_m2 = 0;
+  while (!open.empty() && unknown_m2 < enough_m2) {
+    const Eigen::Vector2i cell = open.back();
+    open.pop_back();
+    if (is_unknown(cell)) unknown_m2 += map_.resolution * map_.resolution;
+    for (const Eigen::Vector2i& side : sides) {
+      const Eigen::Vector2i next = cell + side;
+      if (!map_.contains(next) || met[map_.index(next)] || !accepts(next)) continue;
+      met[map_.index(next)] = true;
+      open.push_back(next);
     }
   }
-  return left;
+  return unknown_m2;
+}
+
+double ExplorationSpace::unknown_left(double enough_m2) const {
+  std::vector<Eigen::Vector2i> reachable;
+  for (int y = 0; y < map_.height; ++y) {
+    for (int x = 0; x < map_.width; ++x) {
+      if (travel_[map_.index({x, y})] != kFar) reachable.emplace_back(x, y);
+    }
+  }
+  // Ways may lead outside the bounds.
+  return flood_unknown(std::move(reachable), enough_m2,
+                       [&](const Eigen::Vector2i& cell) { return is_clear(map_.index(cell)); });
+}
+
+double ExplorationSpace::unknown_pocket(const Vec2& p, double enough_m2) const {
+  const Eigen::Vector2i cell = map_.cell_of(p);
+  if (!is_unknown(cell)) return 0;
+  return flood_unknown({cell}, enough_m2,
+                       [&](const Eigen::Vector2i& next) { return is_unknown(next); });
 }
 
 double ExplorationSpace::reachable_area() const {

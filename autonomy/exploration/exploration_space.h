@@ -29,11 +29,6 @@ struct SpaceConfig {
   }
 };
 
-/// Unknown area, m^2, in all and of its largest pocket.
-struct UnknownLeft {
-  double total_m2 = 0, largest_m2 = 0;
-};
-
 /// What one exploration decision needs to know of the map, computed once and then looked up: what
 /// is free or unknown inside the bounds, how far the nearest obstacle is, where the vehicle can go
 /// through known-free space and how far that is, how much is unknown around a point.
@@ -90,10 +85,13 @@ class ExplorationSpace {
   /// information radius of p.
   [[nodiscard]] double unknown_area(const Vec2& p) const;
 
-  /// What may be left to fly to: the unknown cells inside the bounds to which the vehicle's centre
-  /// could come if all that is unknown were free. Never less than what it truly can come to.
-  /// Counting ends where either area has reached its limit.
-  [[nodiscard]] UnknownLeft unknown_left(const UnknownLeft& limit) const;
+  /// What may be left to fly to: the unknown area, m^2, inside the bounds to which the vehicle's
+  /// centre could come if all that is unknown were free. Counting ends at `enough_m2`.
+  [[nodiscard]] double unknown_left(double enough_m2) const;
+
+  /// Unknown area, m^2, inside the bounds that hangs together with p's cell by its cells' sides,
+  /// whether a vehicle fits in there or not. Counting ends at `enough_m2`.
+  [[nodiscard]] double unknown_pocket(const Vec2& p, double enough_m2) const;
 
   /// Area, m^2, of the cells inside the bounds that the vehicle can go to.
   [[nodiscard]] double reachable_area() const;
@@ -118,6 +116,10 @@ class ExplorationSpace {
   template <class Accepts>
   [[nodiscard]] std::optional<Eigen::Vector2i> nearest_cell(const Vec2& p, Accepts&& accepts) const;
   void flood(const Vec2& robot);
+  /// Unknown area of `open` and of what is `accept`ed beside it, and so on.
+  template <class Accepts>
+  [[nodiscard]] double flood_unknown(std::vector<Eigen::Vector2i> open, double enough_m2,
+                                     Accepts&& accepts) const;
 
   const OccupancyMap2D& map_;
   ExplorationBounds bounds_;

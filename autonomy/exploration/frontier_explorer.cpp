@@ -28,9 +28,6 @@ Decision FrontierExplorer::decide(const OccupancyMap2D& map, const ExplorerInput
     decision.kind = DecisionKind::kStop;
     decision.stop_reason = StopReason::kBattery;
     target_.reset();
-  } else if (little_is_left(space)) {
-    stop(decision, space, StopReason::kLittleLeft);
-    target_.reset();
   } else if (target_) {
     decision.kind = DecisionKind::kKeepTarget;
     set_goal(decision, map);
@@ -47,14 +44,17 @@ Decision FrontierExplorer::decide(const OccupancyMap2D& map, const ExplorerInput
   return decision;
 }
 
-bool FrontierExplorer::little_is_left(const ExplorationSpace& space) const {
-  if (config_.stop.left_fraction == 0 || !space.has_start() || !space.reaches_flown()) return false;
-  // A pocket that fills the disc of f_I is worth a flight in however large a world.
-  const double radius = config_.space.information_radius_m;
-  const UnknownLeft limit{config_.stop.left_fraction * space.reachable_area(),
-                          M_PI * radius * radius};
-  const UnknownLeft left = space.unknown_left(limit);
-  return left.total_m2 < limit.total_m2 && left.largest_m2 < limit.largest_m2;
+bool FrontierExplorer::little_is_left(const Decision& decision,
+                                      const ExplorationSpace& space) const {
+  const double enough = config_.stop.left_fraction * space.reachable_area();
+  if (enough == 0 || !space.reaches_flown() || space.unknown_left(enough) >= enough) return false;
+  // That no vehicle fits through to it may be the map's error: what fills the disc of f_I is worth
+  // a look, and in however large a world.
+  const double disc =
+      M_PI * config_.space.information_radius_m * config_.space.information_radius_m;
+  return std::none_of(decision.candidates.begin(), decision.candidates.end(), [&](const auto& c) {
+    return c.verdict == Verdict::kKept && space.unknown_pocket(c.point, disc) >= disc;
+  });
 }
 
 void FrontierExplorer::balance(Decision& decision, const ExplorationSpace& space,
@@ -132,6 +132,7 @@ void FrontierExplorer::go_on(Decision& decision, const ExplorationSpace& space,
     if (ends) stop(decision, space, any ? StopReason::kLittleLeft : StopReason::kNoCandidates);
     return;
   }
+  if (little_is_left(decision, space)) return stop(decision, space, StopReason::kLittleLeft);
   lost_ways_back_ = 0;
   const Candidate& winner = decision.candidates[*decision.winner];
   target_ = Target{winner.point, winner.viewpoint};

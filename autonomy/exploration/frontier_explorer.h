@@ -57,8 +57,8 @@ class FrontierExplorer : public Explorer {
     Vec2 viewpoint = Vec2::Zero();
   };
 
-  /// Whether what may be left to fly to is not worth going on for.
-  [[nodiscard]] bool little_is_left(const ExplorationSpace& space) const;
+  /// Whether what may be left to fly to, and each of the candidates, is not worth going on for.
+  [[nodiscard]] bool little_is_left(const Decision& decision, const ExplorationSpace& space) const;
   void balance(Decision& decision, const ExplorationSpace& space, const ExplorerInput& input) const;
   TargetEnd settle_target(const ExplorationSpace& space, const ExplorerInput& input);
   /// Whether there still is something to see at a target: enough unknown area, and a border to it.

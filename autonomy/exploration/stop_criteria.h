@@ -35,7 +35,7 @@ struct StopConfig {
     f("min_area_m2", min_area_m2, "stop when no candidate has more unknown area than this");
     f("left_fraction", left_fraction,
       "stop when what is unknown and might be flown to, in all, is less than this part of what can "
-      "be flown to, and no pocket of it fills the disc of f_I; 0: not for that");
+      "be flown to, and no candidate's unknown fills the disc of f_I; 0: not for that");
     f("exhaustive", exhaustive,
       "before it ends for want of candidates: search the whole map for frontiers, and fly back to "
       "what cannot be reached any more; false: the trees' word ends it (paper)");

@@ -178,9 +178,10 @@ TEST(ExplorationSpace, UnknownAreaIsThatOfBruteForceInsideThePolygon) {
 }
 
 /// The unknown cells that another space would reach, were they all free: by the flood of a second
-/// map, and their pockets by flooding each.
+/// map; and pockets of the unknown by another.
 TEST(ExplorationSpace, WhatIsLeftIsWhatItWouldReachIfTheUnknownWereFree) {
-  double pockets = 0;
+  double left = 0;
+  int pockets = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     RandomStream random(seed, "left");
     const OccupancyMap2D map = test::random_map(90, 70, random);
@@ -194,12 +195,10 @@ TEST(ExplorationSpace, WhatIsLeftIsWhatItWouldReachIfTheUnknownWereFree) {
     for (int y = 0; y < map.height; ++y) {
       for (int x = 0; x < map.width; ++x) {
         std::int8_t& state = hoped.cells[map.index({x, y})];
-        if (state != OccupancyMap2D::kUnknown) continue;
-        state = bounds.contains(map.centre_of({x, y})) ? OccupancyMap2D::kFree
-                                                       : OccupancyMap2D::kOccupied;
+        if (state == OccupancyMap2D::kUnknown) state = OccupancyMap2D::kFree;
       }
     }
-    // Bounds are no obstacle: the clearance is that of the map as it is.
+    // Nor are the bounds an obstacle; the clearance is that of the map as it is.
     const auto may_pass = [&](const Eigen::Vector2i& cell) {
       return hoped.contains(cell) && hoped.at(cell) == OccupancyMap2D::kFree &&
              space.clearance(cell) >= config.travel_radius_m - 1e-9;
@@ -212,7 +211,7 @@ TEST(ExplorationSpace, WhatIsLeftIsWhatItWouldReachIfTheUnknownWereFree) {
       while (!open.empty()) {
         const Eigen::Vector2i cell = open.back();
         open.pop_back();
-        unknown += map.at(cell) == OccupancyMap2D::kUnknown;
+        unknown += map.at(cell) == OccupancyMap2D::kUnknown && bounds.contains(map.centre_of(cell));
         for (const Eigen::Vector2i& step : {Eigen::Vector2i(1, 0), Eigen::Vector2i(-1, 0),
                                             Eigen::Vector2i(0, 1), Eigen::Vector2i(0, -1)}) {
           const Eigen::Vector2i next = cell + step;
@@ -226,33 +225,32 @@ TEST(ExplorationSpace, WhatIsLeftIsWhatItWouldReachIfTheUnknownWereFree) {
     double total = 0;
     for (int y = 0, known = 1; y < map.height && known == 1; ++y) {
       for (int x = 0; x < map.width && known == 1; ++x) {
-        if (!space.is_reachable({x, y}) || !may_pass({x, y})) continue;
-        total = flood({x, y}, 1, may_pass);
+        if (!space.is_reachable({x, y})) continue;
+        total = flood({x, y}, 1, [&](const Eigen::Vector2i& cell) {
+          return may_pass(cell) || space.is_reachable(cell);  // also the way that it came
+        });
         known = 2;
       }
     }
-    double largest = 0;
-    int name = 2;
-    for (int y = 0; y < map.height; ++y) {
-      for (int x = 0; x < map.width; ++x) {
-        if (piece[map.index({x, y})] != 1 || space.is_reachable({x, y})) continue;
-        largest = std::max(largest, flood({x, y}, name++, [&](const Eigen::Vector2i& cell) {
-                             return may_pass(cell) && !space.is_reachable(cell);
-                           }));
-        ++pockets;
-      }
-    }
     constexpr double kNone = std::numeric_limits<double>::infinity();
-    const UnknownLeft left = space.unknown_left({kNone, kNone});
-    EXPECT_NEAR(left.total_m2, total, 1e-9) << "seed " << seed;
-    EXPECT_NEAR(left.largest_m2, largest, 1e-9) << "seed " << seed;
-    if (total > 0.5) {
-      EXPECT_NEAR(space.unknown_left({0.5, kNone}).total_m2, 0.5, 1e-9);
-    }
-    if (largest > 0.2) {
-      EXPECT_NEAR(space.unknown_left({kNone, 0.2}).largest_m2, 0.2, 1e-9);
+    EXPECT_NEAR(space.unknown_left(kNone), total, 1e-9) << "seed " << seed;
+    EXPECT_NEAR(space.unknown_left(0.5 * total), 0.5 * total, 0.01);
+    left += total;
+    std::fill(piece.begin(), piece.end(), 0);
+    for (int trial = 0; trial < 30; ++trial) {
+      const Vec2 p = random_in(map, random);
+      const auto hangs_together = [&](const Eigen::Vector2i& cell) {
+        return map.contains(cell) && map.at(cell) == OccupancyMap2D::kUnknown &&
+               bounds.contains(map.centre_of(cell));
+      };
+      const bool any = hangs_together(map.cell_of(p));
+      const double pocket = any ? flood(map.cell_of(p), trial + 1, hangs_together) : 0;
+      EXPECT_NEAR(space.unknown_pocket(p, kNone), pocket, 1e-9) << "seed " << seed;
+      EXPECT_NEAR(space.unknown_pocket(p, 0.2), std::min(pocket, 0.2), 1e-9);
+      pockets += pocket > 0.2;
     }
   }
+  EXPECT_GT(left, 5);
   EXPECT_GT(pockets, 20);
 }
 

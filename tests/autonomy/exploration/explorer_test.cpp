@@ -310,12 +310,19 @@ TEST(Explorer, StopsWhenTheRestOfTheAreaIsSmall) {
   const Decision stop = decide(0.007);
   EXPECT_EQ(stop.kind, DecisionKind::kStop);
   EXPECT_EQ(stop.stop_reason, StopReason::kLittleLeft);
-  // What no vehicle could come to, round which walls stand, does not keep it.
+  // Where no vehicle fits it is seen to from outside, but it does not keep the exploration going.
   test::fill(hall.map, {149, 39}, {160, 48}, OccupancyMap2D::kOccupied);
   test::fill(hall.map, {150, 40}, {159, 47}, OccupancyMap2D::kUnknown);
+  test::fill(hall.map, {149, 42}, {149, 45}, OccupancyMap2D::kFree);
   EXPECT_EQ(decide(1e-6).kind, DecisionKind::kStop);
+  // Unless there may be much behind the gap.
+  test::fill(hall.map, {150, 30}, {167, 60}, OccupancyMap2D::kOccupied);
+  test::fill(hall.map, {151, 31}, {166, 59}, OccupancyMap2D::kUnknown);
+  test::fill(hall.map, {150, 43}, {150, 46}, OccupancyMap2D::kFree);
+  hall.config.filter.obstacle_distance_m = 0.1;
+  EXPECT_EQ(decide(1e-6).kind, DecisionKind::kNewTarget);
   // A pocket that fills the disc of f_I is flown to, whatever its share.
-  test::fill(hall.map, {140, 30}, {165, 60}, OccupancyMap2D::kFree);
+  test::fill(hall.map, {140, 30}, {167, 60}, OccupancyMap2D::kFree);
   test::fill(hall.map, {150, 40}, {167, 57}, OccupancyMap2D::kUnknown);  // 3.24 m^2
   EXPECT_EQ(decide(0.5).kind, DecisionKind::kNewTarget);
 }

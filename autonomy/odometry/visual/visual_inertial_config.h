@@ -58,7 +58,8 @@ struct FeatureTrackerConfig {
     f("patch_px", patch_px,
       "edge of the patch that is followed (VINS-Fusion: 21): a larger one shows near and far at "
       "once");
-    f("pyramid_levels", pyramid_levels, "halvings of the image (VINS-Fusion: 3, of larger patches)");
+    f("pyramid_levels", pyramid_levels,
+      "halvings of the image (VINS-Fusion: 3, of larger patches)");
     f("iterations", iterations, "of one patch on one level");
     f("back_check_px", back_check_px, "followed there and back it misses by less (VINS-Fusion)");
     f("stereo_rows_px", stereo_rows_px, "rows that the eyes may differ by");

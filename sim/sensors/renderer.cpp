@@ -55,6 +55,14 @@ struct Footprint {
   Vec3 inverse_depth;         ///< 1/z of its plane, 1/m
 };
 
+/// Sixteen pixels with the triangles that they show: a leaf's lie in one place of the memory or
+/// two, where a row of depths and one of triangles would be two for each row that it covers.
+struct alignas(64) Tile {
+  static constexpr int kRows = 4;
+  std::array<float, kRows * kLanes> inverse_depth;     ///< 1/z so far, rows from the top
+  std::array<std::uint32_t, kRows * kLanes> triangle;  ///< where anything is drawn
+};
+
 /// A cluster that may be seen; nearer ones come first, of equally near ones the first in the mesh.
 struct Seen {
   double depth = 0;
@@ -81,6 +89,10 @@ struct Renderer::Impl {
   template <Content content>
   void draw_all(const Pose& X_WC);
   void crop(std::vector<float>& out) const;
+  /// The first tile of those that hold row v.
+  [[nodiscard]] std::size_t first_tile(int v) const {
+    return static_cast<std::size_t>(v / Tile::kRows) * static_cast<std::size_t>(stride / kLanes);
+  }
   template <Content content>
   void draw(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW);
   void place(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW);
@@ -98,8 +110,9 @@ struct Renderer::Impl {
   DepthMesh mesh;
   int stride;                        ///< of the picture under way, a multiple of the lanes, px
   std::vector<double> ray_x, ray_y;  ///< of each column and row
-  std::vector<float> picture;        ///< 1/z so far
-  std::vector<std::uint32_t> seen;   ///< the triangle of each pixel of it, where that is asked for
+  // The picture under way: of depths alone 1/z so far, with triangles in tiles.
+  std::vector<float> picture;
+  std::vector<Tile> tiles;
   Corners corners;
   Statistics last_frame;
 };
@@ -163,22 +176,27 @@ void Renderer::Impl::fill_row(const Footprint& footprint, int v, int u_first, in
   const double row0 = e0.y() * y + e0.z(), row1 = e1.y() * y + e1.z(), row2 = e2.y() * y + e2.z();
   const double row_depth = depth.y() * y + depth.z();
   const double most = 1 / options.near_m;
-  const std::size_t first = static_cast<std::size_t>(v) * static_cast<std::size_t>(stride);
-  float* row = &picture[first];
-  std::uint32_t* row_seen = content == Content::kTriangles ? &seen[first] : nullptr;
+  constexpr bool in_tiles = content == Content::kTriangles;
+  const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(stride);
+  const std::size_t tile_row = first_tile(v);
+  const auto row_in_tile = static_cast<std::size_t>(v % Tile::kRows * kLanes);
   for (int u = u_first / kLanes * kLanes; u <= u_last; u += kLanes) {
     const auto x = load<Double4>(&ray_x[static_cast<std::size_t>(u)]);
     const Double4 q = depth.x() * x + row_depth;
     const Long4 covered = (e0.x() * x + row0 >= 0) & (e1.x() * x + row1 >= 0) &
                           (e2.x() * x + row2 >= 0) & (q <= most);
     const auto drawn = __builtin_convertvector(covered ? q : Double4{}, Float4);
-    const auto before = load<Float4>(row + u);
+    Tile* tile = in_tiles ? &tiles[tile_row + static_cast<std::size_t>(u / kLanes)] : nullptr;
+    float* so_far =
+        in_tiles ? &tile->inverse_depth[row_in_tile] : &picture[row + static_cast<std::size_t>(u)];
+    const auto before = load<Float4>(so_far);
     const Float4 after = drawn > before ? drawn : before;
-    std::memcpy(row + u, &after, sizeof after);
-    if constexpr (content == Content::kTriangles) {
-      const auto seen_before = load<Uint4>(row_seen + u);
+    std::memcpy(so_far, &after, sizeof after);
+    if constexpr (in_tiles) {
+      std::uint32_t* seen = &tile->triangle[row_in_tile];
+      const auto seen_before = load<Uint4>(seen);
       const Uint4 seen_after = drawn > before ? triangle - Uint4{} : seen_before;
-      std::memcpy(row_seen + u, &seen_after, sizeof seen_after);
+      std::memcpy(seen, &seen_after, sizeof seen_after);
     }
   }
 }
@@ -245,10 +263,13 @@ std::vector<Seen> Renderer::Impl::visible(const Pose& X_WC) {
 template <Renderer::Impl::Content content>
 void Renderer::Impl::draw_all(const Pose& X_WC) {
   const std::vector<Seen> clusters = visible(X_WC);
-  const std::size_t pixels =
-      static_cast<std::size_t>(stride) * static_cast<std::size_t>(camera.height);
-  picture.assign(pixels, 0.0F);
-  if (content == Content::kTriangles) seen.assign(pixels, kNoTriangle);
+  if constexpr (content == Content::kTriangles) {
+    tiles.resize(first_tile(camera.height - 1) + static_cast<std::size_t>(stride / kLanes));
+    for (Tile& tile : tiles) tile.inverse_depth.fill(0.0F);
+  } else {
+    picture.assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(camera.height),
+                   0.0F);
+  }
   last_frame = {clusters.size(), 0};
   const Pose X_CW = X_WC.inverse();
   for (const Seen& seen_cluster : clusters) {
@@ -288,20 +309,24 @@ void Renderer::render_triangles(const Pose& X_WC, std::vector<float>& inverse_de
                                 std::vector<std::uint32_t>& triangles) {
   Impl& impl = *impl_;
   impl.draw_all<Impl::Content::kTriangles>(X_WC);
-  inverse_depth.swap(impl.picture);
-  triangles.swap(impl.seen);
-  const auto width = static_cast<std::size_t>(impl.camera.width);
-  const auto stride = static_cast<std::size_t>(impl.stride);
-  for (std::size_t v = 1; stride != width && v * stride < triangles.size(); ++v) {
-    std::copy_n(&inverse_depth[v * stride], width, &inverse_depth[v * width]);
-    std::copy_n(&triangles[v * stride], width, &triangles[v * width]);
-  }
-  inverse_depth.resize(width * static_cast<std::size_t>(impl.camera.height));
-  triangles.resize(inverse_depth.size());
+  const int width = impl.camera.width, height = impl.camera.height;
   const auto least = static_cast<float>(1 / impl.options.far_m);
-  for (std::size_t i = 0; i < triangles.size(); ++i) {  // as crop() does
-    triangles[i] = inverse_depth[i] < least ? kNoTriangle : triangles[i];
-    inverse_depth[i] = inverse_depth[i] < least ? 0.0F : inverse_depth[i];
+  inverse_depth.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  triangles.resize(inverse_depth.size());
+  float* to = inverse_depth.data();
+  std::uint32_t* to_triangle = triangles.data();
+  for (int v = 0; v < height; ++v) {
+    const Tile* tile = &impl.tiles[impl.first_tile(v)];
+    const auto row_in_tile = static_cast<std::size_t>(v % Tile::kRows * kLanes);
+    for (int u = 0; u < width; u += kLanes, ++tile) {
+      const float* q = &tile->inverse_depth[row_in_tile];
+      const std::uint32_t* seen = &tile->triangle[row_in_tile];
+      const int count = std::min(kLanes, width - u);
+      for (int i = 0; i < count; ++i) {  // as crop() does
+        *to_triangle++ = q[i] < least ? kNoTriangle : seen[i];
+        *to++ = q[i] < least ? 0.0F : q[i];
+      }
+    }
   }
 }
 

@@ -166,8 +166,9 @@ void FeatureTracker::Impl::test_translation(const std::vector<ImageFeature>& ear
     const Vec3 turned = turn * normalised(features[i].left_px).homogeneous();
     is.push_back(turned / turned.z());
   }
-  const std::vector<bool> fits = fit_translation(was, is, config.ransac_px / camera.f_px,
-                                                 config.ransac_trials, random.fork(exposures));
+  const MotionFit off{config.ransac_px / camera.f_px, config.epipolar_px / camera.f_px};
+  const std::vector<bool> fits =
+      fit_translation(was, is, off, config.ransac_trials, random.fork(exposures));
   std::vector<ImageFeature> kept;
   for (std::size_t i = 0; i < features.size(); ++i) {
     if (fits[i]) kept.push_back(features[i]);

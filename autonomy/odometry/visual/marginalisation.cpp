@@ -23,15 +23,14 @@ LinearRows stacked(const std::vector<LinearRows>& parts) {
   return all;
 }
 
-/// Which of a landmark's sights it starts afresh with when those before go into the prior; their
-/// number: none. One that the newest frame does not see is over.
-std::size_t fresh_from(const Window& window, const Landmark& landmark, const WindowNoise& noise) {
+/// Which of a landmark's sights it starts afresh with when those before go into the prior: the
+/// newest; their number: none. One that the newest frame does not see is over.
+std::size_t fresh_from(const Window& window, const Landmark& landmark) {
   const std::size_t n = landmark.seen.size();
-  if (landmark.seen.back().frame != window.newest().number) return n;
-  return n - std::min(static_cast<std::size_t>(noise.fresh_sights), n - 1);
+  return n < 2 || landmark.seen.back().frame != window.newest().number ? n : n - 1;
 }
 
-/// What the landmarks anchored in the oldest frame say of poses and camera, without the sights that
+/// What the landmarks anchored in the oldest frame say of poses and camera, without the sight that
 /// they start afresh with.
 LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   const WindowLayout layout = window.layout();
@@ -41,7 +40,7 @@ LinearRows landmark_rows(Window& window, const WindowNoise& noise) {
   for (auto& [id, landmark] : window.landmarks) {
     if (landmark.seen.front().frame != window.frames.front().number) continue;
     if (!noise.uses(landmark)) continue;
-    const std::size_t count = fresh_from(window, landmark, noise);
+    const std::size_t count = fresh_from(window, landmark);
     // A single frame says nothing of the others.
     if (count >= 2) add_landmark(window, exposures, landmark, noise, count, equations);
   }
@@ -76,7 +75,7 @@ void leave_oldest(Window& window, const WindowNoise& noise) {
     std::vector<Observation>& seen = landmark.seen;
     if (seen.front().frame == oldest) {
       const bool used = noise.uses(landmark);
-      const std::size_t from = used ? fresh_from(window, landmark, noise) : 1;
+      const std::size_t from = used ? fresh_from(window, landmark) : 1;
       if (from < seen.size()) {
         landmark.state =
             used ? state_from(window, landmark, seen[from]) : LandmarkState{seen[from].left, 0};

@@ -55,7 +55,6 @@ FrameState predict(const FrameState& from, const Preintegration& imu) {
 SlidingWindow::SlidingWindow(const SlidingWindowConfig& config) : config_(config) {
   noise_.huber_sigma = config.huber_sigma;
   noise_.least_images = config.least_observations;
-  noise_.fresh_sights = config.fresh_sights;
   noise_.first_estimates = config.first_estimates;
 }
 

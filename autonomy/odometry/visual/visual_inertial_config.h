@@ -38,13 +38,14 @@ struct FeatureTrackerConfig {
   int cell_px = 60;
   double min_distance_px = 20;
   double least_corner = 60;
-  int patch_px = 21;
-  int pyramid_levels = 3;
+  int patch_px = 11;
+  int pyramid_levels = 4;
   int iterations = 20;
   double back_check_px = 0.5;
   double stereo_rows_px = 2;
   double least_disparity_px = -1;
   double ransac_px = 1.0;
+  double epipolar_px = 0.3;
   int ransac_trials = 60;
   int border_px = 8;
 
@@ -54,13 +55,19 @@ struct FeatureTrackerConfig {
     f("min_distance_px", min_distance_px, "between two features (VINS-Fusion: 30 at 752 columns)");
     f("least_corner", least_corner,
       "smaller eigenvalue of the mean gradient's square, grey values^2/px^2, that is a corner");
-    f("patch_px", patch_px, "edge of the patch that is followed (VINS-Fusion)");
-    f("pyramid_levels", pyramid_levels, "halvings of the image (VINS-Fusion)");
+    f("patch_px", patch_px,
+      "edge of the patch that is followed (VINS-Fusion: 21): a larger one shows near and far at "
+      "once");
+    f("pyramid_levels", pyramid_levels,
+      "halvings of the image (VINS-Fusion: 3, of larger patches)");
     f("iterations", iterations, "of one patch on one level");
     f("back_check_px", back_check_px, "followed there and back it misses by less (VINS-Fusion)");
     f("stereo_rows_px", stereo_rows_px, "rows that the eyes may differ by");
     f("least_disparity_px", least_disparity_px, "a point behind infinity by more is a mismatch");
-    f("ransac_px", ransac_px, "distance from the epipolar line that is an outlier's");
+    f("ransac_px", ransac_px,
+      "distance from the epipolar line that two features and the gyro make: an outlier's");
+    f("epipolar_px", epipolar_px,
+      "and from the one that all features make: of a patch that shows near and far at once");
     f("ransac_trials", ransac_trials, "pairs drawn");
     f("border_px", border_px, "nothing is followed nearer to the image's edge");
     f.check(max_features >= 20 && max_features <= 1000, "20 <= max_features <= 1000");
@@ -70,8 +77,8 @@ struct FeatureTrackerConfig {
     f.check(pyramid_levels >= 0 && pyramid_levels <= 6, "0 <= pyramid_levels <= 6");
     f.check(iterations >= 1 && iterations <= 100, "1 <= iterations <= 100");
     f.check(ransac_trials >= 1 && ransac_trials <= 10000, "1 <= ransac_trials <= 10000");
-    f.check(back_check_px > 0 && ransac_px > 0 && least_corner > 0,
-            "back_check_px, ransac_px, least_corner > 0");
+    f.check(back_check_px > 0 && ransac_px > 0 && epipolar_px > 0 && least_corner > 0,
+            "back_check_px, ransac_px, epipolar_px, least_corner > 0");
     f.check(border_px >= 1 && border_px <= 100, "1 <= border_px <= 100");
   }
 };
@@ -83,7 +90,6 @@ struct SlidingWindowConfig {
   double disparity_std = 0.15;
   double huber_sigma = 1.0;
   int least_observations = 3;
-  int fresh_sights = 1;
   double outlier_px = 1.5;
   int iterations = 4;
   double converged = 0.02;
@@ -102,8 +108,6 @@ struct SlidingWindowConfig {
     f("huber_sigma", huber_sigma, "residuals beyond count linearly (VINS-Fusion)");
     f("least_observations", least_observations,
       "images of either eye that a landmark needs to count");
-    f("fresh_sights", fresh_sights,
-      "newest frames whose sights of a landmark stay when what came before goes into the prior");
     f("outlier_px", outlier_px, "a landmark whose residuals' mean is larger goes (VINS-Fusion: 3)");
     f("iterations", iterations, "of an optimisation (3 do as well as 8)");
     f("converged", converged,
@@ -120,7 +124,6 @@ struct SlidingWindowConfig {
     f.check(pixel_std > 0 && disparity_std > 0 && huber_sigma > 0 && outlier_px > 0,
             "pixel_std, disparity_std, huber_sigma, outlier_px > 0");
     f.check(least_observations >= 2 && least_observations <= 20, "2 <= least_observations <= 20");
-    f.check(fresh_sights >= 1, "fresh_sights >= 1");
     f.check(iterations >= 1 && iterations <= 100, "1 <= iterations <= 100");
     f.check(keyframe_parallax_rad > 0 && keyframe_wait >= 0,
             "keyframe_parallax_rad > 0, keyframe_wait >= 0");

@@ -73,7 +73,6 @@ struct WindowNoise {
   double huber_sigma = 1.5;
   double baseline_m = 0.05;
   int least_images = 3;
-  int fresh_sights = 1;  ///< that a landmark starts afresh with after the rest went into the prior
   bool first_estimates = true;
 
   /// Whether the landmark counts.

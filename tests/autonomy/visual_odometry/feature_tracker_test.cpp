@@ -171,6 +171,9 @@ TEST(FeatureTracker, DrawsTheSameEachTime) {
   EXPECT_EQ(run(), run());
 }
 
+constexpr double kFocal_px = 400;
+constexpr MotionFit kOff{1.0 / kFocal_px, 0.3 / kFocal_px};
+
 TEST(TranslationRansac, TellsWhatMovesOtherwise) {
   RandomStream random(4, "rays");
   const Vec3 t(0.1, 0.02, 0.3);
@@ -183,7 +186,7 @@ TEST(TranslationRansac, TellsWhatMovesOtherwise) {
     after.push_back(q / q.z());
     if (i < kWrong) after.back() += Vec3(0.02 * random.normal(), 0.05 + 0.02 * random.normal(), 0);
   }
-  const auto fits = fit_translation(before, after, 1.0 / 400, 60, RandomStream(1, "draws"));
+  const auto fits = fit_translation(before, after, kOff, 60, RandomStream(1, "draws"));
   int kept_wrong = 0;
   for (int i = 0; i < kPoints; ++i) {
     if (i < kWrong) {
@@ -195,9 +198,39 @@ TEST(TranslationRansac, TellsWhatMovesOtherwise) {
   EXPECT_LE(kept_wrong, 4);
 }
 
+// At the edge of a trunk a patch moves sideways with the trunk and downwards with the ground
+// behind.
+TEST(TranslationRansac, TellsWhatMissesItsLineByLessThanTheGyroIsWrong) {
+  RandomStream random(6, "rays");
+  const Vec3 t(0.02, 0.01, 0.16);
+  const Mat3 lacking = so3::Exp({2.5e-3, -1.5e-3, 1e-3});  // 1 px
+  std::vector<Vec3> before, after;
+  std::vector<double> beside_px;
+  constexpr int kPoints = 120, kAtEdges = 40;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3 p(random.uniform(-5, 5), random.uniform(-1, 3), random.uniform(4, 9));
+    const Vec3 q = p - t, behind = 2.5 * p - t;
+    Vec3 seen = q / q.z();
+    if (i < kAtEdges) seen.y() = behind.y() / behind.z();
+    const Vec3 line = t.cross(p);
+    beside_px.push_back(kFocal_px * std::abs(line.dot(seen)) / line.head<2>().norm());
+    seen.head<2>() += 0.05 / kFocal_px * Vec2(random.normal(), random.normal());
+    before.push_back(p / p.z());
+    after.push_back((lacking * seen).hnormalized().homogeneous());
+  }
+  const auto fits = fit_translation(before, after, kOff, 60, RandomStream(1, "draws"));
+  int told = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (beside_px[i] >= 0.1 && beside_px[i] < 0.5) continue;
+    EXPECT_EQ(fits[i], beside_px[i] < 0.1) << i << ": " << beside_px[i] << " px";
+    told += !fits[i] && beside_px[i] < 1;
+  }
+  EXPECT_GE(told, 8);
+}
+
 TEST(TranslationRansac, KeepsEverythingWhileNothingMoves) {
   const std::vector<Vec3> rays{{0, 0, 1}, {0.1, 0, 1}, {0, 0.1, 1}, {0.3, -0.1, 1}};
-  for (const bool fits : fit_translation(rays, rays, 1.0 / 400, 60, RandomStream(1, "draws"))) {
+  for (const bool fits : fit_translation(rays, rays, kOff, 60, RandomStream(1, "draws"))) {
     EXPECT_TRUE(fits);
   }
 }

@@ -206,7 +206,8 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
       const Vec2 u = out / norm;
       Vec6 row;
       row << -u.x(), -u.y(), -u.x() * h, -u.y() * h, -1, h;
-      A += weight * row * row.transpose();
+      const Vec6 weighted = weight * row;
+      A.noalias() += weighted * row.transpose();
       b -= weight * d * row;
     }
     const Vec6 step = A.ldlt().solve(b);

@@ -180,8 +180,8 @@ TEST(GarageMap, FindsPillarsInWhichWallsMeet) {
 TEST(GarageMap, TakesNoPillarsSideForAWallNorADuctForACeiling) {
   AnalyticGarage garage(0, Vec3::Zero(), 5);
   garage.build();
-  // A pipe along the hall, 0.7 m beside each row, in line with nothing but the pillars' sides, and a
-  // duct on the other side.
+  // A pipe along the hall, 0.7 m beside each row, in line with nothing but the pillars' sides, and
+  // a duct on the other side.
   for (const double y : {6.0, 12.0}) {
     garage.box({0.3, y + 0.95, 2.4}, {29.7, y + 1.05, 2.5}, true);
     garage.face({0.3, y - 1.45, 2.55}, {29.4, 0, 0}, {0, 0.8, 0});

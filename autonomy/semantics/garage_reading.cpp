@@ -241,7 +241,12 @@ SceneReading read_garage(const WorkingCloud& cloud, std::span<const Vec3f> path,
   std::erase_if(structure.pillars,
                 [&](const Pillar& pillar) { return ramps.at(pillar.box.centre, pillar.base_z); });
   std::erase_if(doors, [&](const Door& door) { return ramps.at(door.centre, door.base_z); });
-  std::erase_if(cars, [&](const ParkedCar& car) { return ramps.at(car.box.centre, car.base_z); });
+  std::erase_if(cars, [&](const ParkedCar& car) {
+    // Of what was seen from one side the middle is a guess, behind the ramp's wall.
+    const Vec2 half = 0.5 * car.box.width * car.box.across();
+    return ramps.at(car.box.centre, car.base_z) || ramps.at(car.box.centre + half, car.base_z) ||
+           ramps.at(car.box.centre - half, car.base_z);
+  });
   reading.ground = ground_of(cloud, surfaces);
   reading.heights = clearances.above_floor;
   reading.objects = ramps.ramps();

@@ -10,13 +10,17 @@
 namespace arex {
 namespace {
 
-constexpr double kColumn = 0.25;  // m
-constexpr float kGap = 0.15F;     // m, between groups of a column
-constexpr float kFree = 0.45F;    // m, above a floor or below a ceiling: no sparse wall is level
-constexpr float kThin = 0.3F;     // m, of a group that may be level: a slope of 45 degrees
-constexpr float kNoise = 0.06F;   // m, between neighbours
-constexpr int kWiden = 2;         // cells
-constexpr int kAcross = 24;       // cells, across half of a hole
+constexpr double kColumn = 0.25;     // m
+constexpr float kGap = 0.15F;        // m, between groups of a column
+constexpr float kFree = 0.45F;       // m, above a floor or below a ceiling: no sparse wall is level
+constexpr float kThin = 0.3F;        // m, of a group that may be level: a slope of 45 degrees
+constexpr float kNoise = 0.06F;      // m, between neighbours
+constexpr int kWiden = 2;            // cells
+constexpr int kAcross = 24;          // cells, across half of a hole
+constexpr int kUnder = 12;           // cells, of a floor below things: half a bay
+constexpr float kMansHeight = 2.1F;  // m, of what stands on a floor
+constexpr int kMostOfSquare = 20;    // of the 25 cells of a square of 1.25 m
+constexpr double kWideShare = 0.2;   // of the least floor: where such a square fits
 constexpr std::array<std::pair<int, int>, 4> kSides{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 constexpr float kOff = 0.35F;  // m, what is nearer belongs to the surface (kerbs, beams)
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -165,9 +169,10 @@ LevelSurface::Kind kind_of(const LevelSurface& surface, const ColumnIndex& index
   return above >= below ? LevelSurface::Kind::kFloor : LevelSurface::Kind::kCeiling;
 }
 
-/// Widens a surface by the mean of the neighbours, ring by ring.
-void widen(Raster& height) {
-  for (int ring = 0; ring < kWiden; ++ring) {
+/// Widens a surface by the mean of the neighbours, ring by ring, into cells that `wanted` names.
+template <class Wanted>
+void widen(Raster& height, int rings, const Wanted& wanted) {
+  for (int ring = 0; ring < rings; ++ring) {
     std::vector<std::pair<std::size_t, float>> fresh;
     for (int r = 0; r < height.rows; ++r) {
       for (int c = 0; c < height.columns; ++c) {
@@ -183,10 +188,12 @@ void widen(Raster& height) {
             ++count;
           }
         }
-        if (count > 0) fresh.emplace_back(height.index(c, r), sum / static_cast<float>(count));
+        const float mean = sum / static_cast<float>(count);
+        if (count > 0 && wanted(c, r, mean)) fresh.emplace_back(height.index(c, r), mean);
       }
     }
     for (const auto& [cell, z] : fresh) height.values[cell] = z;
+    if (fresh.empty()) return;
   }
 }
 
@@ -213,13 +220,39 @@ void interpolate_holes(Raster& height) {
   }
 }
 
-void fill(LevelSurface& surface) {
+void fill(LevelSurface& surface, const ColumnIndex& index, const std::vector<Vec3f>& points) {
   surface.seen.resize(surface.height.values.size());
   for (std::size_t i = 0; i < surface.seen.size(); ++i) {
     surface.seen[i] = !std::isnan(surface.height.values[i]);
   }
-  widen(surface.height);
+  widen(surface.height, kWiden, [](int, int, float) { return true; });
   interpolate_holes(surface.height);
+  if (surface.kind != LevelSurface::Kind::kFloor) return;
+  // What stands beside a floor stands on it, though it hides where.
+  widen(surface.height, kUnder, [&](int c, int r, float z) {
+    const auto column = index.at(c, r);
+    return std::any_of(column.begin(), column.end(), [&](std::uint32_t i) {
+      return points[i].z() > z + kOff && points[i].z() < z + kMansHeight;
+    });
+  });
+}
+
+/// Whether a surface is as wide as a room somewhere, where ducts, trays and beams are not.
+bool is_wide(const LevelSurface& surface, double least_m2) {
+  const Raster& height = surface.height;
+  std::size_t inner = 0;
+  for (int r = kWiden; r + kWiden < height.rows; ++r) {
+    for (int c = kWiden; c + kWiden < height.columns; ++c) {
+      int count = 0;
+      for (int dr = -kWiden; dr <= kWiden; ++dr) {
+        for (int dc = -kWiden; dc <= kWiden; ++dc) {
+          count += std::isnan(height.values[height.index(c + dc, r + dr)]) ? 0 : 1;
+        }
+      }
+      inner += count >= kMostOfSquare;
+    }
+  }
+  return static_cast<double>(inner) * kColumn * kColumn >= least_m2;
 }
 
 }  // namespace
@@ -244,7 +277,7 @@ std::vector<LevelSurface> find_level_surfaces(const WorkingCloud& cloud,
       for (Piece& piece : pieces.at(c, r)) {
         if (piece.taken) continue;
         auto surface = grower.grow(c, r, piece, config.min_floor_m2);
-        if (!surface) continue;
+        if (!surface || !is_wide(*surface, kWideShare * config.min_floor_m2)) continue;
         surface->kind = kind_of(*surface, index, cloud.points, path, config.headroom_m);
         surfaces.push_back(std::move(*surface));
       }
@@ -253,7 +286,7 @@ std::vector<LevelSurface> find_level_surfaces(const WorkingCloud& cloud,
   std::stable_sort(surfaces.begin(), surfaces.end(),
                    [](const auto& a, const auto& b) { return a.area_m2 > b.area_m2; });
   if (surfaces.size() > kMostSurfaces) surfaces.resize(kMostSurfaces);
-  for (LevelSurface& surface : surfaces) fill(surface);
+  for (LevelSurface& surface : surfaces) fill(surface, index, cloud.points);
   return surfaces;
 }
 

@@ -25,7 +25,9 @@ struct LevelSurface {
 /// be a piece of a level surface. Pieces grow together with neighbours that the greatest slope
 /// allows. A surface is a floor if more stands on it than hangs below it, up to head height: cars
 /// and pillars on the one side, beams and pipes on the other. What is hidden below things is filled
-/// in: half a metre all around, and holes that have the surface on three sides within 6 m.
+/// in: half a metre all around, holes that have the surface on three sides within 6 m, and of a
+/// floor up to 3 m more below what stands beside it. Nothing that is nowhere 1.25 m wide is a level
+/// surface: ducts, trays and beams are not.
 /// @param path where the vehicle was; a surface below it is floor, one above it ceiling
 std::vector<LevelSurface> find_level_surfaces(const WorkingCloud& cloud,
                                               std::span<const Vec3f> path,

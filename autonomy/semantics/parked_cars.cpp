@@ -15,6 +15,7 @@ constexpr double kCoreLow = 0.25, kCoreHigh = 1.0;  // m above the floor: above 
 constexpr double kRoof = 2.1;                       // m above the floor
 constexpr double kOffWall = 0.12, kOffPillar = 0.12;     // m
 constexpr double kUsualLength = 4.5, kUsualWidth = 1.8;  // m
+constexpr double kCabin = 1.5;                           // m above the floor: windows
 constexpr double kLeastHeight = 1.15;                    // m: parapets are lower
 constexpr double kLeastPart = 1.2;                       // m, of what a cut leaves
 constexpr int kFewestOfCar = 40;                         // points
@@ -99,6 +100,35 @@ void split(const std::vector<Vec3f>& points, Group group, const GarageConfig& co
   split(points, best->second, config, out);
 }
 
+/// Whether what a box holds is as deep at a man's height as at its foot, on the side of it that
+/// shows most: a cabinet. A car's sides lean in above its doors.
+bool is_cabinet(const Rectangle& box, const std::vector<Vec2>& low, const std::vector<Vec2>& high) {
+  constexpr double kFace = 0.15, kFlush = 0.05;  // m
+  constexpr std::size_t kFewest = 20;            // points
+  double best_depth = 0;
+  std::size_t most = 0;
+  for (const double side : {-1.0, 1.0}) {
+    const auto depths = [&](const std::vector<Vec2>& points) {  // behind the side of the box
+      std::vector<double> out;
+      for (const Vec2& p : points) {
+        const double depth = 0.5 * box.width - side * (p - box.centre).dot(box.across());
+        if (depth < kFace) out.push_back(depth);
+      }
+      return out;
+    };
+    std::vector<double> below = depths(low), above = depths(high);
+    if (above.size() < kFewest || below.size() < kFewest || above.size() <= most) continue;
+    most = above.size();
+    const auto median = [](std::vector<double>& values) {
+      const auto mid = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), mid, values.end());
+      return *mid;
+    };
+    best_depth = median(above) - median(below);
+  }
+  return most >= kFewest && best_depth < kFlush;
+}
+
 /// Where the vehicle was nearest.
 Vec2 viewer_of(const Vec2& centre, double z, std::span<const Vec3f> path) {
   Vec2 best = centre;
@@ -147,6 +177,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
       car.points = static_cast<int>(group.size());
       // Its height, from all that stands there.
       std::vector<double> heights;
+      std::vector<Vec2> low, high;
       all.within(static_cast<float>(car.box.centre.x()), static_cast<float>(car.box.centre.y()),
                  static_cast<float>(0.5 * car.box.length + 0.2), [&](std::uint32_t i) {
                    const auto h = static_cast<double>(clearances.above_floor[i]);
@@ -154,6 +185,8 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
                    if (std::abs(floor - car.base_z) < 0.4 && h > kCoreLow && h < kRoof &&
                        car.box.distance(flat(cloud.points[i])) < 0.1) {
                      heights.push_back(h);
+                     if (h < kCoreHigh) low.push_back(flat(cloud.points[i]));
+                     if (h > kCabin) high.push_back(flat(cloud.points[i]));
                    }
                  });
       if (heights.size() < static_cast<std::size_t>(kFewestOfCar)) continue;
@@ -161,7 +194,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
           heights.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(heights.size()));
       std::nth_element(heights.begin(), top, heights.end());
       car.height = *top;
-      if (car.height < kLeastHeight) continue;
+      if (car.height < kLeastHeight || is_cabinet(car.box, low, high)) continue;
       const bool length_seen = car.box.length >= config.car_min_length_m;
       const bool width_seen = car.box.width >= 1.2;
       // Of an end, the whole width and a part of the sides or the bonnet.

@@ -86,7 +86,7 @@ struct SemanticConfig {
   SceneKind scene = SceneKind::kAuto;
   double voxel_m = 0.04;
   double ground_cell_m = 0.5;
-  double planar_fraction = 0.3;
+  double planar_fraction = 0.05;
   StemConfig stem;
   GarageConfig garage;
 

@@ -143,19 +143,22 @@ Company company_of(const std::vector<Vec3>& points, const Line& line) {
   return company;
 }
 
-bool is_slender(const StemEvidence& e, const Line& line, const Company& company,
-                const StemConfig& config) {
+/// Whether a line's company is a stem's. Asked before a cone is fitted: few lines in leaves pass.
+bool is_stem_line(const Line& line, const Company& company) {
   constexpr int kLeastTop = 13;         // layers: above breast height
   constexpr double kLeastFilled = 0.6;  // of the layers up to there
   constexpr double kLeastBeyond = 7;    // layers, beyond what chance fills
   constexpr int kLeastBare = 4;         // layers
   constexpr double kMostLean = 0.2;     // per metre
-  constexpr double kThickest = 0.08;    // m, radius
-  constexpr double kError = 0.01;       // m, of a thin stem's diameter
   return company.top >= kLeastTop && company.filled >= kLeastFilled * company.top &&
          company.filled - company.chance >= kLeastBeyond && company.bare >= kLeastBare &&
-         line.lean.norm() < kMostLean && e.stem.radius < kThickest &&
-         2 * e.stem.radius >= config.min_diameter_m - kError;
+         line.lean.norm() < kMostLean;
+}
+
+bool is_slender(const StemEvidence& e, const StemConfig& config) {
+  constexpr double kThickest = 0.08;  // m, radius
+  constexpr double kError = 0.01;     // m, of a thin stem's diameter
+  return e.stem.radius < kThickest && 2 * e.stem.radius >= config.min_diameter_m - kError;
 }
 
 /// Radius of the circle whose points are this far from its middle in the mean, when each is off by
@@ -203,7 +206,8 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
       const Vec2 u = out / norm;
       Vec6 row;
       row << -u.x(), -u.y(), -u.x() * h, -u.y() * h, -1, h;
-      A += weight * row * row.transpose();
+      const Vec6 weighted = weight * row;
+      A.noalias() += weighted * row.transpose();
       b -= weight * d * row;
     }
     const Vec6 step = A.ldlt().solve(b);
@@ -309,6 +313,7 @@ std::vector<StemEvidence> find_slender_stems(const WorkingCloud& cloud, const Co
       raster.visit(*foot, kTried, [&](std::size_t cell) { closed[cell] = 1; });
       const Line line = fit_line(points, *foot);
       const Company company = company_of(points, line);
+      if (!is_stem_line(line, company)) continue;
       std::vector<Vec3> core;
       for (const Vec3& p : points) {
         if (p.z() >= kConeLow && line.distance(p) <= kOfCone) core.push_back(p);
@@ -318,7 +323,7 @@ std::vector<StemEvidence> find_slender_stems(const WorkingCloud& cloud, const Co
       if (!stem) continue;
       stem->radius = without_noise(stem->radius);
       const StemEvidence evidence = weigh_stem(core, *stem);
-      if (!is_slender(evidence, line, company, config)) continue;
+      if (!is_slender(evidence, config)) continue;
       found.push_back({evidence, company.filled - company.chance});
     }
   }

@@ -168,7 +168,8 @@ Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
       const Vec2 u = out / norm;
       Vec6 row;
       row << -u.x(), -u.y(), -u.x() * h, -u.y() * h, -1, h;
-      A += weight / (kSigma * kSigma) * row * row.transpose();
+      const Vec6 weighted = weight / (kSigma * kSigma) * row;
+      A.noalias() += weighted * row.transpose();
       b -= weight / (kSigma * kSigma) * d * row;
     }
     Vec6 prior = Vec6::Zero(), sigma;

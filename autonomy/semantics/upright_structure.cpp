@@ -2,8 +2,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -20,7 +22,7 @@ constexpr double kLeastBand = 0.4;      // m
 constexpr double kOnLine = 0.06;        // m, from a wall's line
 constexpr double kTaken = 0.09;         // m, from a wall's face: no pillar's
 constexpr double kWallGap = 1.0;        // m, a pillar or a door in a wall
-constexpr double kLeastWall = 1.0;      // m, of covered length: more than a pillar's side
+constexpr double kLeastWall = 1.0;      // m, of a piece without a gap: more than a pillar's side
 constexpr double kStraight = 0.03;      // m, deviation of a wall's points from its line
 constexpr double kCovered = 0.6;        // of a wall's length
 constexpr double kClusterStep = 0.25;   // m, between points of one cluster
@@ -30,18 +32,50 @@ struct Band {
   std::vector<std::uint32_t> of_cloud;
 };
 
-bool in_band(float above_floor, float room) {
-  const double high = std::min(kBandHigh, static_cast<double>(room) - kBelowCeiling);
-  const double low = std::min(kBandLow, high - kLeastBand);
-  return static_cast<double>(above_floor) >= low && static_cast<double>(above_floor) <= high;
-}
+/// The heights above each floor at which nothing but walls and pillars is looked for.
+class BandHeights {
+ public:
+  explicit BandHeights(const Clearances& clearances) : clearances_(clearances) {
+    std::vector<std::vector<float>> rooms;
+    for (std::size_t i = 0; i < clearances.room.size(); ++i) {
+      if (clearances.floor_of[i] < 0 || !std::isfinite(clearances.room[i])) continue;
+      const auto floor = static_cast<std::size_t>(clearances.floor_of[i]);
+      if (floor >= rooms.size()) rooms.resize(floor + 1);
+      rooms[floor].push_back(clearances.room[i]);
+    }
+    for (std::vector<float>& room : rooms) {
+      const auto mid = room.begin() + static_cast<std::ptrdiff_t>(room.size() / 2);
+      if (!room.empty()) std::nth_element(room.begin(), mid, room.end());
+      low_.push_back(room.empty() ? kBandLow : low_of(static_cast<double>(*mid)));
+    }
+  }
+  /// Over a point's floor: where the storey as a whole is low, and not below a lone duct, the band
+  /// begins lower.
+  [[nodiscard]] double low(std::uint32_t point) const {
+    const auto floor = static_cast<std::size_t>(clearances_.floor_of[point]);
+    return floor < low_.size() ? low_[floor] : kBandLow;
+  }
+  [[nodiscard]] double high(std::uint32_t point) const {
+    return high_of(static_cast<double>(clearances_.room[point]));
+  }
+  [[nodiscard]] bool has(std::uint32_t point) const {
+    const auto above = static_cast<double>(clearances_.above_floor[point]);
+    return clearances_.floor_of[point] >= 0 && above >= low(point) && above <= high(point);
+  }
 
-Band band_of(const WorkingCloud& cloud, const Clearances& clearances) {
+ private:
+  static double high_of(double room) { return std::min(kBandHigh, room - kBelowCeiling); }
+  static double low_of(double room) { return std::min(kBandLow, high_of(room) - kLeastBand); }
+  const Clearances& clearances_;
+  std::vector<double> low_;  ///< of each floor
+};
+
+Band band_of(const WorkingCloud& cloud, const BandHeights& heights) {
   Band band;
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    if (!in_band(clearances.above_floor[i], clearances.room[i])) continue;
+  for (std::uint32_t i = 0; i < cloud.points.size(); ++i) {
+    if (!heights.has(i)) continue;
     band.points.push_back(cloud.points[i]);
-    band.of_cloud.push_back(static_cast<std::uint32_t>(i));
+    band.of_cloud.push_back(i);
   }
   return band;
 }
@@ -156,10 +190,11 @@ class WallGrower {
     constexpr float kStorey = 1.5F;
     const double start = (from - line.p).dot(line.u);
     double ends[2] = {start, start};
-    std::size_t filled = 0;
+    std::vector<int> filled;  // bins, from the start
     float low = z, high = z;
     for (const int side : {-1, 1}) {
       double gap = 0;
+      int bin = side > 0 ? 0 : -1;
       for (double t = start + (side > 0 ? 0 : -kBin); gap <= kWallGap; t += side * kBin) {
         const Vec2 middle = line.p + (t + 0.5 * kBin) * line.u;
         const std::size_t before = taken.size();
@@ -175,24 +210,40 @@ class WallGrower {
                         high = std::max(high, band_.points[i].z());
                       });
         if (taken.size() > before) {
-          ++filled;
+          filled.push_back(bin);
           gap = 0;
           ends[side > 0 ? 1 : 0] = side > 0 ? t + kBin : t;
         } else {
           gap += kBin;
         }
+        bin += side;
       }
     }
     const double length = ends[1] - ends[0];
-    const double covered = static_cast<double>(filled) * kBin;
-    if (taken.size() < 6 || covered < kCovered * length || covered < kLeastWall - kBin)
+    const double covered = static_cast<double>(filled.size()) * kBin;
+    if (taken.size() < 6 || covered < kCovered * length ||
+        longest_run(std::move(filled)) * kBin < kLeastWall - kBin) {
       return false;
+    }
     wall.a = line.p + ends[0] * line.u;
     wall.b = line.p + ends[1] * line.u;
     wall.low = static_cast<double>(low);
     wall.high = static_cast<double>(high);
     wall.points = static_cast<int>(taken.size());
     return true;
+  }
+
+  /// How many bins the longest piece spans that has no gap wider than between points far off.
+  static int longest_run(std::vector<int> bins) {
+    constexpr int kStep = 3;  // bins
+    std::sort(bins.begin(), bins.end());
+    int longest = 0;
+    for (std::size_t first = 0, last = 0; first < bins.size(); first = last) {
+      for (last = first + 1; last < bins.size() && bins[last] - bins[last - 1] <= kStep; ++last) {
+      }
+      longest = std::max(longest, bins[last - 1] - bins[first] + 1);
+    }
+    return longest;
   }
 
   [[nodiscard]] std::vector<std::size_t> members(const WallFace& wall, double within) const {
@@ -257,12 +308,159 @@ void complete(Pillar& pillar, const WallFace& wall, const std::vector<Vec2>& poi
   pillar.box.yaw_rad = std::fmod(std::atan2(u.y(), u.x()) + 2 * std::numbers::pi, std::numbers::pi);
 }
 
-void merge_twins(std::vector<Pillar>& pillars) {
+struct FittedSquare {
+  Rectangle box;
+  double gain = 0;  ///< m of outline that is filled, less what is not
+};
+
+/// The square whose outline the band's points around a piece of a pillar fill.
+///
+/// Where walls meet at a pillar, each of the corners between them shows a piece of it, and no piece
+/// shows its width. A piece's outer edges are the pillar's, though: of the squares that have one of
+/// the piece's corners, the one that gains most from what of its outline is filled, by walls'
+/// points or others. What is filled half and empty inside is a pillar: walls end at its sides.
+class OutlinedSquare {
+ public:
+  /// @param around the band's points within kReach of the piece; @param yaw_rad of the walls
+  OutlinedSquare(const std::vector<Vec2>& piece, const std::vector<Vec2>& around, double yaw_rad)
+      : piece_(rectangle_around(piece, yaw_rad, kTail)),
+        u_(std::cos(yaw_rad), std::sin(yaw_rad)),
+        v_(-u_.y(), u_.x()),
+        filled_(kCells * kCells, 0),
+        inside_((kCells + 1) * (kCells + 1), 0) {
+    std::vector<int> count(kCells * kCells, 0);
+    for (const Vec2& p : around) {
+      const int c = cell((p - piece_.centre).dot(u_)), r = cell((p - piece_.centre).dot(v_));
+      if (!within(c, r)) continue;
+      ++count[index(c, r)];
+      for (int dr = -kOff; dr <= kOff; ++dr) {
+        for (int dc = -kOff; dc <= kOff; ++dc) {
+          if (within(c + dc, r + dr)) filled_[index(c + dc, r + dr)] = 1;
+        }
+      }
+    }
+    for (int r = 0; r < kCells; ++r) {
+      for (int c = 0; c < kCells; ++c) {
+        sum(c + 1, r + 1) = sum(c, r + 1) + sum(c + 1, r) - sum(c, r) + count[index(c, r)];
+      }
+    }
+  }
+
+  static constexpr double kReach = 1.8;  ///< m
+
+  /// Nothing if no square of such sides fits.
+  [[nodiscard]] std::optional<FittedSquare> fit(double least, double most) const {
+    constexpr double kStep = 0.02, kEmpty = 0.1;  // m, of the points within the outline
+    const Vec2 half = half_sizes();
+    std::optional<FittedSquare> best;
+    for (double side = std::max(least, 2 * half.maxCoeff()); side <= most; side += kStep) {
+      for (const double x : {-1.0, 1.0}) {
+        for (const double y : {-1.0, 1.0}) {
+          // The square's corner at the piece's, the rest of it behind.
+          const Vec2 middle(x * (half.x() - 0.5 * side), y * (half.y() - 0.5 * side));
+          const auto [covered, all] = outline(middle, 0.5 * side);
+          const double gain = covered - kMissing * (all - covered);
+          if ((best && gain <= best->gain) || covered < kCovered * all) continue;
+          const int inner = count_of(middle, 0.5 * side - kMargin);
+          if (inner > kEmpty * count_of(middle, 0.5 * side + kMargin)) continue;
+          const Vec2 centre = piece_.centre + middle.x() * u_ + middle.y() * v_;
+          best = FittedSquare{{centre, side, side, yaw()}, gain};
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  static constexpr double kTail = 0.04;     // of the points: edges throw some off
+  static constexpr double kCell = 0.02;     // m
+  static constexpr int kOff = 2;            // cells, of points from an outline
+  static constexpr double kMargin = 0.08;   // m: noise and drift of what is on an outline
+  static constexpr double kCovered = 0.5;   // of an outline
+  static constexpr double kMissing = 0.75;  // of the gain: what an empty metre of outline costs
+  static constexpr int kCells = 2 * static_cast<int>(kReach / kCell);
+
+  [[nodiscard]] double yaw() const {
+    return std::fmod(std::atan2(u_.y(), u_.x()) + 2 * std::numbers::pi, std::numbers::pi);
+  }
+  /// Of the piece, along u and v.
+  [[nodiscard]] Vec2 half_sizes() const {
+    const bool along = std::abs(piece_.along().dot(u_)) > std::numbers::sqrt2 / 2;
+    return 0.5 * (along ? Vec2(piece_.length, piece_.width) : Vec2(piece_.width, piece_.length));
+  }
+  static int cell(double offset) { return static_cast<int>(std::floor((offset + kReach) / kCell)); }
+  static bool within(int c, int r) { return c >= 0 && r >= 0 && c < kCells && r < kCells; }
+  static std::size_t index(int c, int r) {
+    return static_cast<std::size_t>(r) * kCells + static_cast<std::size_t>(c);
+  }
+  int& sum(int c, int r) {
+    return inside_[static_cast<std::size_t>(r) * (kCells + 1) + static_cast<std::size_t>(c)];
+  }
+  /// Points in a square.
+  [[nodiscard]] int count_of(const Vec2& middle, double half) const {
+    if (half <= 0) return 0;
+    const auto at = [&](int c, int r) {
+      return inside_[static_cast<std::size_t>(std::clamp(r, 0, kCells)) * (kCells + 1) +
+                     static_cast<std::size_t>(std::clamp(c, 0, kCells))];
+    };
+    const int c0 = cell(middle.x() - half), c1 = cell(middle.x() + half) + 1;
+    const int r0 = cell(middle.y() - half), r1 = cell(middle.y() + half) + 1;
+    return at(c1, r1) - at(c0, r1) - at(c1, r0) + at(c0, r0);
+  }
+  /// Steps of a square's outline with points, and all of them, m.
+  [[nodiscard]] std::pair<double, double> outline(const Vec2& middle, double half) const {
+    constexpr double kStep = 0.04;  // m
+    const int steps = std::max(1, static_cast<int>(std::lround(2 * half / kStep)));
+    int covered = 0;
+    for (int i = 0; i < steps; ++i) {
+      const double t = -half + (i + 0.5) / steps * 2 * half;
+      for (const double side : {-half, half}) {
+        for (const Vec2& p : {Vec2(t, side), Vec2(side, t)}) {
+          const int c = cell(middle.x() + p.x()), r = cell(middle.y() + p.y());
+          covered += within(c, r) && filled_[index(c, r)] != 0;
+        }
+      }
+    }
+    const double length = 2 * half / steps;
+    return {covered * length, 4 * steps * length};
+  }
+
+  Rectangle piece_;
+  Vec2 u_, v_;
+  std::vector<std::uint8_t> filled_;  ///< cells near a point
+  std::vector<int> inside_;           ///< points below and left of each cell's corner
+};
+
+/// Whether a corner of one lies in the other: enough for what is about as large.
+bool overlap(const Rectangle& a, const Rectangle& b) {
+  const auto reaches = [](const Rectangle& one, const Rectangle& other) {
+    const Vec2 u = 0.5 * one.length * one.along(), v = 0.5 * one.width * one.across();
+    for (const Vec2& corner : {Vec2(u + v), Vec2(u - v), Vec2(-u + v), Vec2(-u - v)}) {
+      if (other.distance(one.centre + corner) < 0) return true;
+    }
+    return false;
+  };
+  return reaches(a, b) || reaches(b, a);
+}
+
+/// A pillar as one of its pieces has it.
+struct PillarPiece {
+  Pillar pillar;
+  double gain = 0;  ///< of its outline, m; 0 if none was fitted
+};
+
+std::vector<Pillar> merge_twins(std::vector<PillarPiece> pieces) {
   constexpr double kTwins = 0.45;  // m: one pillar, seen from both sides of its wall
+  // The piece whose outline is filled best says where the pillar is.
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const PillarPiece& a, const PillarPiece& b) { return a.gain > b.gain; });
+  std::vector<Pillar> pillars;
+  for (const PillarPiece& piece : pieces) pillars.push_back(piece.pillar);
   for (std::size_t i = 0; i < pillars.size(); ++i) {
     for (std::size_t j = i + 1; j < pillars.size();) {
       Pillar &a = pillars[i], &b = pillars[j];
-      if ((a.box.centre - b.box.centre).norm() > kTwins || std::abs(a.base_z - b.base_z) > 1.5) {
+      const bool twins = overlap(a.box, b.box) || (a.box.centre - b.box.centre).norm() < kTwins;
+      if (!twins || std::abs(a.base_z - b.base_z) > 1.5) {
         ++j;
         continue;
       }
@@ -274,66 +472,194 @@ void merge_twins(std::vector<Pillar>& pillars) {
       pillars.erase(pillars.begin() + static_cast<std::ptrdiff_t>(j));
     }
   }
+  return pillars;
 }
 
-std::vector<Pillar> pillars_of(const Band& band, const std::vector<std::uint8_t>& free,
-                               const std::vector<WallFace>& walls, const WorkingCloud& cloud,
-                               const ColumnIndex& all, const Clearances& clearances,
-                               const GarageConfig& config) {
-  constexpr double kTail = 0.04;  // of the points: edges throw some off
-  constexpr double kTouch = 0.2, kProud = 0.08, kLeastProud = 0.28;  // m
-  constexpr double kBeam = 0.9, kPost = 0.3;                         // m
-  constexpr std::size_t kFewest = 12;
-  std::vector<Vec3f> rest;
-  std::vector<std::uint32_t> of_cloud;
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    if (free[i] == 0) continue;
-    rest.push_back(band.points[i]);
-    of_cloud.push_back(band.of_cloud[i]);
-  }
-  std::vector<Pillar> pillars;
-  for (const auto& cluster : euclidean_clusters(rest, kClusterStep, static_cast<int>(kFewest))) {
-    std::vector<Vec2> points;
-    std::vector<float> floors;
-    float room = std::numeric_limits<float>::infinity();
-    for (const std::uint32_t i : cluster) {
-      points.push_back(flat(rest[i]));
-      room = std::min(room, clearances.room[of_cloud[i]]);
-      floors.push_back(rest[i].z() - clearances.above_floor[of_cloud[i]]);
+/// What of the band no wall has taken falls into pieces; pillars are made of them.
+class PillarFinder {
+ public:
+  PillarFinder(const Band& band, const BandHeights& heights, const ColumnIndex& index,
+               const std::vector<WallFace>& walls, const WorkingCloud& cloud,
+               const ColumnIndex& all, const Clearances& clearances, const GarageConfig& config)
+      : band_(band),
+        heights_(heights),
+        index_(index),
+        walls_(walls),
+        cloud_(cloud),
+        all_(all),
+        clearances_(clearances),
+        config_(config) {}
+
+  [[nodiscard]] std::vector<Pillar> find(const std::vector<std::uint8_t>& free) const {
+    constexpr int kFewest = 12;
+    std::vector<Vec3f> rest;
+    std::vector<std::uint32_t> of_cloud;
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      if (free[i] == 0) continue;
+      rest.push_back(band_.points[i]);
+      of_cloud.push_back(band_.of_cloud[i]);
     }
-    std::nth_element(floors.begin(),
-                     floors.begin() + static_cast<std::ptrdiff_t>(floors.size() / 2), floors.end());
-    Pillar pillar;
-    pillar.base_z = static_cast<double>(floors[floors.size() / 2]);
-    pillar.points = static_cast<int>(cluster.size());
-    pillar.box = fit_rectangle(points, kTail);
-    if (pillar.box.length > config.pillar_max_m || pillar.box.length < config.pillar_min_m)
-      continue;
-    if (!reaches_down(pillar.box, all, cloud, clearances, pillar.base_z, pillar)) continue;
-    // It bears a ceiling, or is too thick for a lamp post.
-    const bool bears = pillar.top_z > pillar.base_z + static_cast<double>(room) - kBeam;
-    if (std::isfinite(room) ? !bears : pillar.box.length < kPost) continue;
-    const auto wall = std::find_if(walls.begin(), walls.end(), [&](const WallFace& w) {
-      const auto z = static_cast<double>(rest[cluster.front()].z());
-      return z > w.low - 1 && z < w.high + 1 &&
-             std::any_of(points.begin(), points.end(),
+    std::vector<PillarPiece> pillars;
+    for (const auto& cluster : euclidean_clusters(rest, kClusterStep, kFewest)) {
+      const Piece piece = piece_of(rest, of_cloud, cluster);
+      if (rectangle_around(piece.points, 0, 0).length <= 2 * config_.pillar_max_m) {
+        if (auto pillar = pillar_of(piece)) pillars.push_back(*pillar);
+        continue;
+      }
+      // A duct or a pipe that passes by joins what stands.
+      std::vector<Vec3f> standing;
+      std::vector<std::uint32_t> standing_of;
+      for (const std::uint32_t i : upright_of(rest, of_cloud, cluster)) {
+        standing.push_back(rest[i]);
+        standing_of.push_back(of_cloud[i]);
+      }
+      for (const auto& part : euclidean_clusters(standing, kClusterStep, kFewest)) {
+        if (auto pillar = pillar_of(piece_of(standing, standing_of, part))) {
+          pillars.push_back(*pillar);
+        }
+      }
+    }
+    return merge_twins(std::move(pillars));
+  }
+
+ private:
+  static constexpr double kLeastProud = 0.28;  // m, side of a pillar at a wall
+  static constexpr double kUpright = 0.6;      // of the band's height
+  static constexpr double kOneSide = 0.35;     // width over length
+  struct Piece {
+    std::vector<Vec2> points;
+    double z = 0, base_z = 0;  ///< of one of its points; of its floor
+    float room = std::numeric_limits<float>::infinity();
+    float low = std::numeric_limits<float>::infinity(), high = 0;  ///< above the floor
+    double band = 0;  ///< the band's height where it is highest
+  };
+
+  [[nodiscard]] Piece piece_of(const std::vector<Vec3f>& points,
+                               const std::vector<std::uint32_t>& of_cloud,
+                               const std::vector<std::uint32_t>& cluster) const {
+    Piece piece;
+    std::vector<float> floors;
+    for (const std::uint32_t i : cluster) {
+      const std::uint32_t k = of_cloud[i];
+      piece.points.push_back(flat(points[i]));
+      piece.room = std::min(piece.room, clearances_.room[k]);
+      floors.push_back(points[i].z() - clearances_.above_floor[k]);
+      piece.low = std::min(piece.low, clearances_.above_floor[k]);
+      piece.high = std::max(piece.high, clearances_.above_floor[k]);
+      piece.band = std::max(piece.band, heights_.high(k) - heights_.low(k));
+    }
+    piece.z = static_cast<double>(points[cluster.front()].z());
+    const auto mid = floors.begin() + static_cast<std::ptrdiff_t>(floors.size() / 2);
+    std::nth_element(floors.begin(), mid, floors.end());
+    piece.base_z = static_cast<double>(*mid);
+    return piece;
+  }
+
+  /// Those of a cluster above and below which the band is filled, within a hand's breadth.
+  [[nodiscard]] std::vector<std::uint32_t> upright_of(
+      const std::vector<Vec3f>& points, const std::vector<std::uint32_t>& of_cloud,
+      const std::vector<std::uint32_t>& cluster) const {
+    constexpr float kSquare = 0.05F;  // m
+    constexpr double kLayer = 0.15;   // m
+    const auto square = [&](std::uint32_t i) {
+      return Eigen::Vector2i((points[i].head<2>() / kSquare).array().floor().cast<int>());
+    };
+    std::map<std::pair<int, int>, std::uint32_t> layers;
+    for (const std::uint32_t i : cluster) {
+      const std::uint32_t k = of_cloud[i];
+      const double above = static_cast<double>(clearances_.above_floor[k]) - heights_.low(k);
+      const Eigen::Vector2i at = square(i);
+      layers[{at.x(), at.y()}] |= 1U
+                                  << static_cast<unsigned>(std::clamp(above / kLayer, 0.0, 31.0));
+    }
+    std::vector<std::uint32_t> upright;
+    for (const std::uint32_t i : cluster) {
+      const std::uint32_t k = of_cloud[i];
+      const Eigen::Vector2i at = square(i);
+      std::uint32_t filled = 0;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const auto found = layers.find({at.x() + dx, at.y() + dy});
+          if (found != layers.end()) filled |= found->second;
+        }
+      }
+      const double band = heights_.high(k) - heights_.low(k);
+      if (std::popcount(filled) * kLayer >= kUpright * band) upright.push_back(i);
+    }
+    return upright;
+  }
+
+  [[nodiscard]] std::optional<PillarPiece> pillar_of(const Piece& piece) const {
+    constexpr double kTail = 0.04;                 // of the points: edges throw some off
+    constexpr double kTouch = 0.2, kProud = 0.08;  // m
+    constexpr double kBeam = 0.9, kPost = 0.3;     // m
+    // Door leaves and frames reach into the band, no further.
+    if (static_cast<double>(piece.high - piece.low) < kUpright * piece.band) return std::nullopt;
+    PillarPiece found;
+    Pillar& pillar = found.pillar;
+    pillar.base_z = piece.base_z;
+    pillar.points = static_cast<int>(piece.points.size());
+    pillar.box = fit_rectangle(piece.points, kTail);
+    if (pillar.box.length > config_.pillar_max_m) return std::nullopt;
+    if (!reaches_down(pillar.box, all_, cloud_, clearances_, pillar.base_z, pillar)) {
+      return std::nullopt;
+    }
+    const auto wall = std::find_if(walls_.begin(), walls_.end(), [&](const WallFace& w) {
+      return piece.z > w.low - 1 && piece.z < w.high + 1 &&
+             std::any_of(piece.points.begin(), piece.points.end(),
                          [&](const Vec2& p) { return w.distance(p) < kTouch; });
     });
-    if (wall != walls.end()) {
+    const bool at_wall = wall != walls_.end();
+    // Two sides of one that are seen alone are far apart.
+    const bool one_side = pillar.box.width < kOneSide * pillar.box.length;
+    const auto square = at_wall ? square_at(piece, std::atan2(wall->along().y(), wall->along().x()))
+                        : one_side ? square_at(piece, pillar.box.yaw_rad)
+                                   : std::nullopt;
+    if (square) {
+      pillar.box = square->box;
+      found.gain = square->gain;
+    }
+    if (pillar.box.length < config_.pillar_min_m) return std::nullopt;
+    // It bears a ceiling, or is too thick for a lamp post.
+    const bool bears = pillar.top_z > pillar.base_z + static_cast<double>(piece.room) - kBeam;
+    if (std::isfinite(piece.room) ? !bears : pillar.box.length < kPost) return std::nullopt;
+    if (at_wall && !square) {
       double proud = 0;
-      for (const Vec2& p : points) proud = std::max(proud, wall->distance(p));
-      if (proud < kProud || pillar.box.length < kLeastProud) continue;
+      for (const Vec2& p : piece.points) proud = std::max(proud, wall->distance(p));
+      if (proud < kProud || pillar.box.length < kLeastProud) return std::nullopt;
       pillar.attached = true;
-      complete(pillar, *wall, points);
-    } else if (pillar.box.width < 0.35 * pillar.box.length) {
+      complete(pillar, *wall, piece.points);
+    } else if (pillar.box.width < kOneSide * pillar.box.length) {
       // One face is all that was seen: as deep as it is wide, on the side where nothing is.
       pillar.attached = true;
     }
-    pillars.push_back(pillar);
+    return found;
   }
-  merge_twins(pillars);
-  return pillars;
-}
+
+  [[nodiscard]] std::optional<FittedSquare> square_at(const Piece& piece, double yaw) const {
+    constexpr double kStorey = 1.5;  // m
+    const Vec2 middle = rectangle_around(piece.points, 0, 0).centre;
+    std::vector<Vec2> around;
+    index_.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
+                  static_cast<float>(std::numbers::sqrt2 * OutlinedSquare::kReach),
+                  [&](std::uint32_t i) {
+                    if (std::abs(static_cast<double>(band_.points[i].z()) - piece.z) < kStorey) {
+                      around.push_back(flat(band_.points[i]));
+                    }
+                  });
+    return OutlinedSquare(piece.points, around, yaw)
+        .fit(std::max(kLeastProud, config_.pillar_min_m), config_.pillar_max_m);
+  }
+
+  const Band& band_;
+  const BandHeights& heights_;
+  const ColumnIndex& index_;
+  const std::vector<WallFace>& walls_;
+  const WorkingCloud& cloud_;
+  const ColumnIndex& all_;
+  const Clearances& clearances_;
+  const GarageConfig& config_;
+};
 
 /// A wall's floor, by the band's points on it.
 double floor_of(const WallFace& wall, const Band& band, const ColumnIndex& index,
@@ -386,7 +712,8 @@ bool stands(WallFace& wall, const WorkingCloud& cloud, const ColumnIndex& all,
 UprightStructure find_upright_structure(const WorkingCloud& cloud, const Clearances& clearances,
                                         const GarageConfig& config) {
   UprightStructure structure;
-  const Band band = band_of(cloud, clearances);
+  const BandHeights heights(clearances);
+  const Band band = band_of(cloud, heights);
   if (band.points.empty()) return structure;
   const ColumnIndex index(band.points, cloud.low, cloud.high, WorkingCloud::kCell);
   const ColumnIndex all(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
@@ -396,7 +723,8 @@ UprightStructure find_upright_structure(const WorkingCloud& cloud, const Clearan
     if (stands(wall, cloud, all, clearances)) structure.walls.push_back(wall);
   }
   structure.pillars =
-      pillars_of(band, grower.free(), structure.walls, cloud, all, clearances, config);
+      PillarFinder(band, heights, index, structure.walls, cloud, all, clearances, config)
+          .find(grower.free());
   return structure;
 }
 

@@ -39,10 +39,12 @@ struct UprightStructure {
 /// Walls and pillars: what fills the band above cars and doors and below beams and pipes.
 ///
 /// Wall faces grow along the local direction of the band's points, seen from above, over gaps up to
-/// 1 m, and are lines through what they took (least squares), covered to 60 % and over 1 m at
-/// least, that go on below the band. What is left falls into clusters (PCL); a compact one that
-/// reaches from the ceiling, if there is one, down is a pillar. One that touches a wall shows only
-/// what sticks out of it: it is taken to be as deep as it is wide.
+/// 1 m, and are lines through what they took (least squares), covered to 60 % and over 1 m without
+/// a gap at least, that go on below the band: a pillar's side in line with a pipe is no wall. What
+/// is left falls into clusters (PCL); a compact one that fills the band's height and reaches from
+/// the ceiling, if there is one, down is a pillar. Where walls meet in a pillar, each piece of it
+/// between them shows a corner: the square with that corner whose outline the band's points fill
+/// best is the pillar. One that only sticks out of a wall is taken to be as deep as it is wide.
 UprightStructure find_upright_structure(const WorkingCloud& cloud, const Clearances& clearances,
                                         const GarageConfig& config);
 

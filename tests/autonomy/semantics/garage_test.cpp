@@ -145,6 +145,65 @@ TEST(GarageMap, FindsPillarsCarsWallsAndTheRamp) {
   }
 }
 
+/// A wall's two faces, 0.2 m apart, from pillar to pillar.
+void partition(AnalyticGarage& garage, const Vec2& a, const Vec2& b) {
+  constexpr double kPillar = 0.25, kHalf = 0.1;  // m
+  const Vec2 u = (b - a).normalized(), n(-u.y(), u.x());
+  for (const double side : {-kHalf, kHalf}) {
+    const Vec2 start = a + kPillar * u + side * n, run = b - a - 2 * kPillar * u;
+    garage.face({start.x(), start.y(), 0}, {run.x(), run.y(), 0}, {0, 0, AnalyticGarage::kHeight});
+  }
+}
+
+TEST(GarageMap, FindsPillarsInWhichWallsMeet) {
+  for (const double yaw : {0.0, 0.4}) {
+    AnalyticGarage garage(yaw, {12, -7, -8}, 4);
+    garage.build();
+    // Walls meet at corners, in a T and in a line.
+    partition(garage, {7.5, 6}, {15, 6});
+    partition(garage, {7.5, 6}, {7.5, 12});
+    partition(garage, {7.5, 12}, {15, 12});
+    partition(garage, {15, 6}, {15, 12});
+    partition(garage, {15, 12}, {22.5, 12});
+    const SemanticMap map = build_semantic_map(garage.points, {}, {});
+    EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size()) << yaw;
+    for (const Vec2& pillar : garage.pillars) {
+      const Vec2 p = garage.place({pillar.x(), pillar.y(), 0}).head<2>();
+      const SemanticObject* found = nearest(map, SemanticClass::kPillar, p);
+      ASSERT_NE(found, nullptr);
+      EXPECT_LT((found->position.head<2>() - p).norm(), 0.05) << yaw << ", " << pillar.transpose();
+      EXPECT_NEAR(found->size.x(), 0.5, 0.08) << pillar.transpose();
+    }
+  }
+}
+
+TEST(GarageMap, TakesNoPillarsSideForAWallNorADuctForACeiling) {
+  AnalyticGarage garage(0, Vec3::Zero(), 5);
+  garage.build();
+  // A pipe along the hall, 0.7 m beside each row, in line with nothing but the pillars' sides, and
+  // a duct on the other side.
+  for (const double y : {6.0, 12.0}) {
+    garage.box({0.3, y + 0.95, 2.4}, {29.7, y + 1.05, 2.5}, true);
+    garage.face({0.3, y - 1.45, 2.55}, {29.4, 0, 0}, {0, 0.8, 0});
+    garage.face({0.3, y - 0.65, 2.55}, {29.4, 0, 0}, {0, 0, 0.3});
+  }
+  const SemanticMap map = build_semantic_map(garage.points, {}, {});
+  EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size());
+  for (const Vec2& pillar : garage.pillars) {
+    const SemanticObject* found = nearest(map, SemanticClass::kPillar, pillar);
+    ASSERT_NE(found, nullptr);
+    EXPECT_LT((found->position.head<2>() - pillar).norm(), 0.05) << pillar.transpose();
+  }
+}
+
+TEST(GarageMap, TakesNoRowOfCabinetsForACar) {
+  AnalyticGarage garage(0.4, {3, 2, 0}, 6);
+  garage.build();
+  garage.box({10, 17.25, 0}, {13.26, 17.85, 2.0}, true);
+  const SemanticMap map = build_semantic_map(garage.points, {}, {});
+  EXPECT_EQ(map.count(SemanticClass::kCar), garage.cars.size());
+}
+
 TEST(GarageMap, LabelsItsSurfaces) {
   AnalyticGarage garage(0, Vec3::Zero(), 2);
   garage.build();

@@ -5,7 +5,7 @@
 //
 // Keys are those of `world` and `semantics`, as in a scenario. --keep stores the clouds in a folder
 // and takes them from there the next time; --list names what was missed or invented; --run takes
-// the cloud and the path of a run of that seed instead of making one.
+// world, cloud and path of a run instead of making them, with any one seed.
 
 #include <chrono>
 #include <cstdio>
@@ -16,6 +16,11 @@
 #include <vector>
 
 #include "config/config.h"
+#include "report/run_record.h"
+#include "run/file_io.h"
+#include "run/run_folder.h"
+#include "run/scenario.h"
+#include "scoring/odometry_error.h"
 #include "scoring/semantic_score.h"
 #include "semantics/cloud_file.h"
 #include "semantics/semantic_map.h"
@@ -73,18 +78,24 @@ support::MappedCloud cloud_of(const worlds::World& world,
   return cloud;
 }
 
-/// What a run has left; O where it should begin.
+/// What a run has left; O in W by the best fit of its trajectories, as the run's own score has it.
 support::MappedCloud cloud_of_run(const worlds::World& world, const fs::path& run) {
-  constexpr double kStanding = 0.14, kStep = 0.25;  // m
+  constexpr double kStep = 0.25;  // m
   support::MappedCloud cloud;
   cloud.points_O = read_cloud_file(run / "cloud.pcd").points;
-  cloud.X_WO = {world.X_WS.R, world.X_WS.p + Vec3(0, 0, kStanding)};
-  std::ifstream poses(run / "estimate.tum");
-  for (std::string line; std::getline(poses, line);) {
-    Vec3 p;
-    if (std::sscanf(line.c_str(), "%*f %lf %lf %lf", &p.x(), &p.y(), &p.z()) != 3) continue;
+  const auto truth = sim::read_tum(run / "truth.tum"),
+             estimate = sim::read_tum(run / "estimate.tum");
+  const Pose X_WO = sim::start_pose(world) * truth.front().X.inverse();
+  std::vector<sim::PosePair> pairs;
+  for (std::size_t i = 0, j = 0; i < estimate.size(); ++i) {
+    while (j < truth.size() && truth[j].time_s < estimate[i].time_s) ++j;
+    if (j == truth.size()) break;
+    const Vec3& p = estimate[i].X.p;
     if (cloud.path_O.empty() || (p - cloud.path_O.back()).norm() > kStep) cloud.path_O.push_back(p);
+    if (truth[j].time_s > estimate[i].time_s) continue;
+    pairs.push_back({from_seconds(truth[j].time_s), X_WO * truth[j].X, estimate[i].X});
   }
+  cloud.X_WO = sim::align_map(pairs);
   return cloud;
 }
 
@@ -160,7 +171,9 @@ int main_of(const std::vector<std::string>& words) {
   read_config(root, trial);
   if (!keep.empty()) fs::create_directories(keep);
   for (std::uint64_t seed = std::stoull(words.at(1)); seed <= std::stoull(words.at(2)); ++seed) {
-    const worlds::World world = worlds::build_world(trial.world, seed, 0.305);
+    const worlds::World world =
+        run.empty() ? worlds::build_world(trial.world, seed, 0.305)
+                    : sim::load_scenario(run / "resolved.yaml", {}, {}).build_world();
     const fs::path kept =
         keep.empty() ? fs::path() : keep / (words[0] + std::to_string(seed) + ".cloud");
     const auto cloud =

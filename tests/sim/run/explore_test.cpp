@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <numbers>
 
 #include "run/simulation.h"
 
@@ -32,9 +34,10 @@ void expect_explored(const FlightResult& result, double area_fraction, double su
   EXPECT_GE(result.coverage->surface_fraction, surface_fraction);
   EXPECT_GT(result.battery.state_of_charge, 0.2);  // the reserve is kept
   EXPECT_GT(result.exploration.issued, 3);
-  // It stopped because nothing larger than the threshold was left that it could reach.
+  // It stopped because nothing was left to see that fills the disc of f_I.
   EXPECT_NE(result.exploration.stop_reason, StopReason::kBattery);
-  EXPECT_LT(result.exploration.open_frontier_m2.value(), StopConfig{}.min_area_m2);
+  const double radius = SpaceConfig{}.information_radius_m;
+  EXPECT_LT(result.exploration.open_frontier_m2.value(), std::numbers::pi * radius * radius);
   ASSERT_TRUE(result.flight.landing.has_value());
   EXPECT_TRUE(result.flight.landing->on_floor);
   EXPECT_GT(result.flight.landing->clearance_m, LandingConfig{}.margin_m);
@@ -51,7 +54,10 @@ TEST(Explore, ASmallForestIsExploredAndTheVehicleComesHome) {
 TEST(Explore, ASmallGarageIsExploredDownItsRamp) {
   const FlightResult& result = reference("garage_small");
   expect_explored(result, 0.90, 0.7);
-  EXPECT_LT(result.flight.poses.back().X_OB.p.z(), -8);  // on the floor below
+  // Down below most of the time; it may look into the yard again before it lands.
+  const auto below = std::count_if(result.flight.poses.begin(), result.flight.poses.end(),
+                                   [](const auto& pose) { return pose.X_OB.p.z() < -6; });
+  EXPECT_GT(below, static_cast<long>(result.flight.poses.size() / 2));
 }
 
 // A triangle of the small forest: what is scored is what is explored, not the box around it, which

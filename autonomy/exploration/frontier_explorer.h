@@ -11,10 +11,6 @@
 
 namespace arex {
 
-/// Where the vehicle flies over a place.
-[[nodiscard]] Vec3 at_flight_height(const ExplorerConfig& config, const Vec2& place,
-                                    const OccupancyMap2D& map);
-
 /// What explorers of frontiers share: the battery, what becomes of a target, the way out of a
 /// pocket of the 2D map, and when to stop. Which frontier is next is the business of those derived
 /// from it.

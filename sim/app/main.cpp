@@ -5,6 +5,7 @@
 #include <exception>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/commands.h"
@@ -280,7 +281,9 @@ std::vector<std::string> alternatives(const CLI::App& command, const std::string
   return names;
 }
 
-// CLI11 only says that a word was not expected; the nearest one is what the user looks for.
+// CLI11 only says that a word was not expected; the nearest one is what the user looks for. And it
+// takes the next option for the value of one that was left without: `--bag --quiet` wrote a bag of
+// that name.
 void expect_known_words(const CLI::App& app, const std::vector<std::string>& words) {
   if (words.empty() || words[0].starts_with("-")) return;
   std::vector<std::string> names;
@@ -293,12 +296,23 @@ void expect_known_words(const CLI::App& app, const std::vector<std::string>& wor
     throw ConfigError("arex: unknown command '" + words[0] + "'; did you mean '" +
                       nearest(words[0], names) + "'? See arex --help");
   }
+  const CLI::Option* waiting = nullptr;  // for its value, the next word
   for (const std::string& word : words) {
     if (word == "--") return;
+    const CLI::Option* option_before = std::exchange(waiting, nullptr);
     if (!word.starts_with("--")) continue;
     const std::string option = word.substr(0, word.find('='));
     const std::vector<std::string> known = alternatives(*command, option);
-    if (known.empty()) continue;
+    if (known.empty() && option_before != nullptr) {
+      throw ConfigError("arex " + words[0] + ": " + option_before->get_name() +
+                        " needs a value before " + option + "; see arex " + words[0] + " --help");
+    }
+    if (known.empty()) {
+      const CLI::Option* named = command->get_option_no_throw(option);
+      if (named != nullptr && named->get_items_expected_min() > 0 && word == option)
+        waiting = named;
+      continue;
+    }
     throw ConfigError("arex " + words[0] + ": unknown option '" + option + "'; did you mean '" +
                       nearest(option, known) + "'? See arex " + words[0] + " --help");
   }

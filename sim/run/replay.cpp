@@ -80,27 +80,43 @@ bool Replay::Track::follow(const Odometry& odometry, Stamp stamp) {
   if (!estimates.empty() && stamp <= estimates.back().stamp) return false;
   newest = odometry.stamp;
   estimates.push_back({stamp, Pose(), odometry.X_OB});
+  covariances.emplace_back(odometry.covariance.cast<float>());
   return true;
 }
 
-std::vector<PosePair> Replay::Track::beside(const std::vector<StampedPose>& truth) const {
-  std::vector<PosePair> pairs;
+Replay::Beside Replay::Track::beside(const std::vector<StampedPose>& truth) const {
+  Beside both;
   auto after = estimates.begin();
   for (const StampedPose& pose : truth) {
     after = std::lower_bound(after, estimates.end(), pose.stamp,
                              [](const PosePair& e, Stamp stamp) { return e.stamp < stamp; });
     if (after == estimates.end()) break;
     if (after->stamp == pose.stamp) {
-      pairs.push_back({pose.stamp, pose.X_WB, after->X_OB});
+      both.pairs.push_back({pose.stamp, pose.X_WB, after->X_OB});
     } else if (after != estimates.begin()) {
       const PosePair& before = *std::prev(after);
       const Stamp gap = after->stamp - before.stamp;
       if (gap > kLongestGap) continue;
       const double fraction = to_seconds(pose.stamp - before.stamp) / to_seconds(gap);
-      pairs.push_back({pose.stamp, pose.X_WB, interpolate(before.X_OB, after->X_OB, fraction)});
+      both.pairs.push_back(
+          {pose.stamp, pose.X_WB, interpolate(before.X_OB, after->X_OB, fraction)});
+    } else {
+      continue;
     }
+    both.covariances.push_back(covariances[static_cast<std::size_t>(after - estimates.begin())]);
   }
-  return pairs;
+  return both;
+}
+
+OdometryScore Replay::Beside::score() const {
+  OdometryScore score = score_odometry(pairs);
+  Nees nees;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    nees.add(pairs.front(), pairs[i], covariances[i].cast<double>());
+  }
+  score.nees_rotation = nees.rotation();
+  score.nees_position = nees.position();
+  return score;
 }
 
 Replay::Replay(const Scenario& scenario, ReplayInput& input, int threads)
@@ -229,12 +245,13 @@ ReplayResult Replay::finish(const std::vector<StampedPose>& truth) {
   result.began = !flown_.estimates.empty();
   result.lost = flown_.status == OdometryStatus::kLost;
   result.missing = kOdometryNeedNames[static_cast<std::size_t>(stack_->view().need)];
-  result.poses = flown_.beside(truth);
-  result.odometry = score_odometry(result.poses);
+  Beside flown = flown_.beside(truth);
+  result.odometry = flown.score();
+  result.poses = std::move(flown.pairs);
   result.lost_s = flown_.lost_s;
   for (const auto& [name, track] : others_) {
     if (track.estimates.empty()) continue;
-    result.others[name] = {score_odometry(track.beside(truth)), track.lost_s};
+    result.others[name] = {track.beside(truth).score(), track.lost_s};
   }
   if (!result.poses.empty()) result.distance_m = length_of(result.poses);
   if (recorder_) {

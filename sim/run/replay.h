@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <functional>
 #include <map>
 #include <memory>
@@ -60,15 +61,22 @@ class Replay {
   ReplayResult finish(const std::vector<StampedPose>& truth);
 
  private:
+  /// Truth and estimate where there are both, and what the estimate believes of its errors.
+  struct Beside {
+    std::vector<PosePair> pairs;
+    std::vector<Eigen::Matrix<float, 6, 6>> covariances;  ///< one for each, as Odometry::covariance
+    [[nodiscard]] OdometryScore score() const;
+  };
+
   /// What an odometry source said.
   struct Track {
-    std::vector<PosePair> estimates;  ///< the truth left open
+    std::vector<PosePair> estimates;                      ///< the truth left open
+    std::vector<Eigen::Matrix<float, 6, 6>> covariances;  ///< one for each
     Stamp newest = -1;
     double lost_s = 0;
     OdometryStatus status = OdometryStatus::kInitialising;
     bool follow(const Odometry& odometry, Stamp stamp);
-    /// Truth and estimate where there are both.
-    [[nodiscard]] std::vector<PosePair> beside(const std::vector<StampedPose>& truth) const;
+    [[nodiscard]] Beside beside(const std::vector<StampedPose>& truth) const;
   };
 
   void deliver();

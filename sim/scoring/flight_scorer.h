@@ -102,7 +102,7 @@ class FlightScorer {
     std::vector<PosePair> poses;
     Stamp newest = -1;  ///< stamp of the last estimate
     double lost_s = 0;
-    Nees nees;  ///< from where it first moves
+    Nees nees;
 
     [[nodiscard]] OdometryScore score() const;
     /// @return whether there is a new estimate

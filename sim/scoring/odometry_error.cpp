@@ -93,7 +93,8 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs) {
 
 void Nees::add(const PosePair& first, const PosePair& now,
                const Eigen::Matrix<double, 6, 6>& covariance) {
-  if (covariance.isZero(0)) return;
+  constexpr double kMoved = 0.1;  // m
+  if (covariance.isZero(0) || (now.X_WB.p - first.X_WB.p).norm() <= kMoved) return;
   const Pose X_OB = first.X_OB * (first.X_WB.inverse() * now.X_WB);  // the truth's
   const Vec3 rotation = so3::Log(X_OB.R.transpose() * now.X_OB.R);
   const Vec3 position = now.X_OB.p - X_OB.p;

@@ -56,6 +56,7 @@ OdometryScore score_odometry(const std::vector<PosePair>& pairs);
 /// Normalised estimation error squared, per dimension: e^T P^-1 e / 3 of attitude and of position,
 /// aligned at the first pose. One in the mean, if the errors are as large as their covariance says
 /// (Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation, 5.4).
+/// From where it first moves, and only away from there: where it stands it is right by definition.
 class Nees {
  public:
   /// @param covariance of [rotation in B, position in O]; one of zeros is passed over

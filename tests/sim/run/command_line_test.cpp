@@ -395,6 +395,11 @@ TEST(CommandLine, NamesTheNearestCommandAndOption) {
             "arex run: unknown option '--quite'; did you mean '--quiet'? See arex run --help\n");
   EXPECT_NE(said({"sweep", "x.yaml", "--jbos=3"}).find("did you mean '--jobs'?"),
             std::string::npos);
+  // A value that was left out is not the next option.
+  EXPECT_EQ(said({"run", kWaypoints, "--bag", "--quiet"}),
+            "arex run: --bag needs a value before --quiet; see arex run --help\n");
+  EXPECT_EQ(said({"run", kWaypoints, "--threads", "--seed=3"}),
+            "arex run: --threads needs a value before --seed; see arex run --help\n");
   EXPECT_NE(said({"pattern", "--shot", "3"}).find("did you mean '--shots'?"), std::string::npos);
   // What does not belong on a terminal does not get there.
   EXPECT_EQ(said({"\x1b[31mrun"}).find('\x1b'), std::string::npos);

@@ -117,6 +117,8 @@ TEST(RecordedFlight, GivesItsEstimatesAndItsMapWhenReplayed) {
     EXPECT_EQ(result.outcome(), "succeeded");
     EXPECT_LT(result.odometry.ate_rmse_m, 0.05);
     EXPECT_GT(result.odometry.ate_rmse_m, 1e-4);  // it is compared with the truth, not with itself
+    EXPECT_NEAR(result.odometry.nees_position / flight.flight.odometry.nees_position, 1, 0.01);
+    EXPECT_NEAR(result.odometry.nees_rotation / flight.flight.odometry.nees_rotation, 1, 0.01);
     EXPECT_EQ(input.imu_counts().missing + input.imu_counts().unordered, 0U);
     EXPECT_EQ(input.lidar_counts().missing + input.lidar_counts().damaged, 0U);
     EXPECT_EQ(input.lidar_misses(),

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace arex {
@@ -86,8 +87,12 @@ void Mission::wait_until_ready(const Inputs& inputs) {
   }
 }
 
+// What hovers too high has taken off as well: more thrust than was reckoned with, and a controller
+// that leaves its share of it.
 void Mission::take_off(const Inputs& inputs) {
-  if (has_arrived(inputs)) {
+  const Vec3 beside = inputs.odometry.X_OB.p - request_.goal_O;
+  const Vec3 error(beside.x(), beside.y(), std::min(beside.z(), 0.0));
+  if (rests(inputs, error.norm() < config_.arrival_radius_m)) {
     const bool explores = config_.kind == MissionConfig::Kind::kExplore;
     enter(explores ? MissionState::kEntry : MissionState::kFly, inputs);
   } else if (stalls(inputs, (request_.goal_O - inputs.odometry.X_OB.p).norm(),
@@ -284,10 +289,11 @@ void Mission::explore(const Inputs& inputs) {
     return_to_land(inputs);
     return;
   }
-  // An explorer without a map says nothing.
+  // An explorer without a map says nothing, and one to which the vehicle stands in an obstacle
+  // waits.
   if (std::exchange(decided_, false)) progress_.begin(inputs.now);
   if (inputs.now - progress_.since() >= from_seconds(config_.ready_timeout_s)) {
-    end_stuck("no_map");
+    end_stuck(waits_ ? "start_not_free" : "no_map");
     enter(MissionState::kLand, inputs);
     return;
   }
@@ -305,7 +311,8 @@ void Mission::explore(const Inputs& inputs) {
 
 void Mission::decide(const Decision& decision) {
   if (state_ != MissionState::kExplore) return;
-  decided_ = true;
+  waits_ = decision.kind == DecisionKind::kWait;
+  decided_ |= !waits_;
   if (decision.kind == DecisionKind::kStop) {
     const auto reason = kStopReasonNames[static_cast<std::size_t>(decision.stop_reason)];
     events_(decision.stop_reason == StopReason::kBattery ? EventKind::kBattery

@@ -255,6 +255,7 @@ class Mission {
   TargetProgress target_progress_ = TargetProgress::kUnderWay;
   bool stop_exploring_ = false;
   bool decided_ = false;  ///< the explorer has said something since the last step
+  bool waits_ = false;    ///< the last that it said is that it waits
   std::optional<LandingQuery> landing_query_;
   std::vector<Vec2> landings_tried_;
   std::optional<LandingPlace> landing_;  ///< where it flies to land; none: home

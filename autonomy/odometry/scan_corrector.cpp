@@ -14,7 +14,7 @@ namespace {
 constexpr Stamp kShakenFor = kNanosecondsPerSecond;
 /// A surfel's own error is the same for scan after scan and does not average out with their noise.
 /// So much more than that noise it leaves in the map, by the NEES of flights.
-constexpr double kSharedError = 28;
+constexpr double kSharedError = 150;
 
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {
   std::vector<float> fractions;

@@ -20,7 +20,6 @@ CompanionLink::CompanionLink(const InterfaceConfig& config, const MotorBelief& m
                              std::uint64_t seed)
     : config_(config),
       motor_(motor, vehicle),
-      nominal_v_(motor.nominal_voltage_v),
       battery_v_(motor.nominal_voltage_v),
       software_(std::move(software)),
       up_(config.uart, seed, "uart up"),
@@ -52,7 +51,7 @@ void CompanionLink::hand_on(const Report& what) {
 }
 
 double CompanionLink::throttle_of(double thrust_n) const {
-  return std::clamp(thrust_n / (kRotors * motor_.full_thrust(nominal_v_)), 0.0, 1.0);
+  return std::clamp(thrust_n / (kRotors * motor_.full_thrust(config_.throttle_voltage_v)), 0.0, 1.0);
 }
 
 double CompanionLink::thrust_of(double throttle) const {

@@ -65,7 +65,6 @@ class CompanionLink : public FlightSoftware {
 
   InterfaceConfig config_;
   MotorModel motor_;
-  double nominal_v_;
   double battery_v_;  ///< as the autopilot measures it
   std::unique_ptr<FlightSoftware> software_;
   SerialLine<Report> up_;

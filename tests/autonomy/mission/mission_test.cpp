@@ -321,6 +321,20 @@ TEST(Mission, GivesUpATakeOffThatDoesNotClimb) {
   EXPECT_EQ(heavy.mission.state(), MissionState::kDone);  // down again, disarmed
 }
 
+// A controller without integral that got more thrust than it reckoned with hangs above its goal.
+TEST(Mission, WhatHoversTooHighHasTakenOff) {
+  for (const double above_m : {-0.5, -0.25, 0.25, 0.5}) {
+    Desk desk(waypoints({{1, 0, 1}}));
+    desk.run(10, [&](Desk& hovering) {
+      const auto kind = hovering.request.kind;
+      hovering.in.armed = kind != MotionRequest::Kind::kNone;
+      if (kind != MotionRequest::Kind::kTakeoff) return;
+      hovering.in.odometry.X_OB.p = hovering.request.goal_O + above_m * Vec3::UnitZ();
+    });
+    EXPECT_EQ(desk.mission.state(), above_m > 0 ? MissionState::kFly : MissionState::kTakeoff);
+  }
+}
+
 TEST(Mission, DropsALegThatItDoesNotGetOnAndFliesTheNext) {
   Desk desk(waypoints({{1, 0, 1}, {9, 0, 1}, {0, 0, 1}}));
   desk.run(200, pilot_until(5));
@@ -372,6 +386,22 @@ TEST(Mission, AnExplorerThatNeverSpeaksIsNotWaitedForForEver) {
   desk.run(200, pilot_until(50));
   EXPECT_EQ(desk.mission.stuck(), "no_map");
   EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+}
+
+// A map that has the floor for an obstacle leaves the vehicle no free cell to begin in.
+TEST(Mission, AnExplorerThatOnlyWaitsIsNotWaitedForForEver) {
+  Desk desk(exploration(true));
+  double explores_s = 0;
+  desk.run(200, [&](Desk& hovering) {
+    pilot_until(50)(hovering);
+    if (hovering.mission.state() == MissionState::kExplore) explores_s += 0.02;
+    Decision wait;
+    wait.kind = DecisionKind::kWait;
+    hovering.mission.decide(wait);
+  });
+  EXPECT_EQ(desk.mission.stuck(), "start_not_free");
+  EXPECT_EQ(desk.mission.state(), MissionState::kDone);
+  EXPECT_NEAR(explores_s, 20, 1);  // ready_timeout_s
 }
 
 using Ask = OperatorCommand::Kind;

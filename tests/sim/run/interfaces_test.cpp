@@ -241,7 +241,7 @@ TEST(CompanionLink, GivesLessThrustForAThrottleAsTheBatterySags) {
     const auto command = link.tick();
     ASSERT_TRUE(command);
     EXPECT_NEAR(command->thrust_n,
-                18.0 * model.full_thrust(voltage) / model.full_thrust(motor.nominal_voltage_v),
+                18.0 * model.full_thrust(voltage) / model.full_thrust(config.throttle_voltage_v),
                 1e-9);
   }
   CompanionLink weak(config, motor, vehicle, std::make_unique<Asking>(500.0), 1);

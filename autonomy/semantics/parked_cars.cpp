@@ -27,7 +27,7 @@ bool at_structure(const Vec3f& p, const UprightStructure& structure) {
     if (z > wall.base_z - 0.3 && z < wall.high && wall.distance(q) < kOffWall) return true;
   }
   return std::any_of(structure.pillars.begin(), structure.pillars.end(), [&](const Pillar& pillar) {
-    return z > pillar.base_z - 0.3 && z < pillar.top_z && pillar.box.distance(q) < kOffPillar;
+    return z > pillar.base_z - 0.3 && z < pillar.top_z && pillar.box.reaches(q, kOffPillar);
   });
 }
 
@@ -183,7 +183,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
                    const auto h = static_cast<double>(clearances.above_floor[i]);
                    const double floor = static_cast<double>(cloud.points[i].z()) - h;
                    if (std::abs(floor - car.base_z) < 0.4 && h > kCoreLow && h < kRoof &&
-                       car.box.distance(flat(cloud.points[i])) < 0.1) {
+                       car.box.reaches(flat(cloud.points[i]), 0.1)) {
                      heights.push_back(h);
                      if (h < kCoreHigh) low.push_back(flat(cloud.points[i]));
                      if (h > kCabin) high.push_back(flat(cloud.points[i]));

@@ -226,8 +226,8 @@ bool reaches_down(const Rectangle& box, const ColumnIndex& index, const WorkingC
                static_cast<float>(reach), [&](std::uint32_t i) {
                  const double h = static_cast<double>(clearances.above_floor[i]);
                  const auto z = static_cast<double>(cloud.points[i].z());
-                 if (std::abs(z - h - base_z) > 0.5 || box.distance(flat(cloud.points[i])) > kSlack)
-                   return;
+                 if (std::abs(z - h - base_z) > 0.5) return;
+                 if (!box.reaches(flat(cloud.points[i]), kSlack)) return;
                  top = std::max(top, z);
                  const double layer = (h - kFrom) / kLayer;
                  if (layer >= 0 && layer < layers) filled[static_cast<std::size_t>(layer)] = true;

@@ -223,8 +223,8 @@ std::vector<Group> groups_of(const World& world, SurfaceClass kind, bool merge) 
     Group group;
     group.add(triangles);
     const auto same = [&](const Group& other) {
-      if (kind == SurfaceClass::kDoor) {  // a leaf and its frame
-        constexpr double kHinge = 0.15;   // m
+      if (kind == SurfaceClass::kDoor) {  // a leaf and its frame, a wall's thickness apart
+        constexpr double kHinge = 0.25;   // m
         Eigen::AlignedBox3d wide = other.box;
         wide.min().array() -= kHinge;
         wide.max().array() += kHinge;

@@ -15,10 +15,11 @@ struct Door {
   bool open = false;
 };
 
-/// Doors in wall faces, which are known from above the doors' heads: over 0.7 to 3 m of a wall's
-/// length, from the floor to 1.8 to 2.5 m, either a leaf stands before or behind the face by 2.5 to
-/// 18 cm (shut), or there is nothing at the face but something behind it (open). What sticks out at
-/// a pillar is no door.
+/// Doors in wall faces, which are known from above the doors' heads: over 0.75 to 3 m of a wall's
+/// length, below a lintel and with wall on both sides, either a leaf stands before or behind the
+/// wall around it by 2 to 18 cm (shut), or there is nothing at the face and the floor goes through
+/// (open): where something hides a wall, it hides the floor at its foot, too. What sticks out at a
+/// pillar is no door.
 std::vector<Door> find_doors(const WorkingCloud& cloud, const Clearances& clearances,
                              const UprightStructure& structure);
 

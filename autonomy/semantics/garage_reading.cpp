@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kOnSurface = 0.12;  // m, roughness and noise of a floor's or ceiling's points
 constexpr double kOnFace = 0.1;      // m, likewise of a wall's
+constexpr double kBesideLeaf = 0.2;  // m, of a shut door from its wall's face
 
 /// @param size along its own axes and upwards, from base_z on
 SemanticObject object_of(SemanticClass kind, const Vec2& centre, double base_z, const Vec3& size,
@@ -201,19 +202,18 @@ SemanticClass part_of(const Vec3f& p, double above_floor, double room,
   const auto z = static_cast<double>(p.z());
   const auto on_floor_of = [&](double base) { return std::abs(z - above_floor - base) < 0.6; };
   for (const Pillar& pillar : structure.pillars) {
-    if (on_floor_of(pillar.base_z) && pillar.box.distance(q) < kOnFace) {
+    if (on_floor_of(pillar.base_z) && pillar.box.reaches(q, kOnFace)) {
       return SemanticClass::kPillar;
     }
   }
   for (const ParkedCar& car : cars) {
-    if (on_floor_of(car.base_z) && above_floor < car.height + 0.15 && car.box.distance(q) < 0.12) {
+    if (on_floor_of(car.base_z) && above_floor < car.height + 0.15 && car.box.reaches(q, 0.12)) {
       return SemanticClass::kCar;
     }
   }
   for (const Door& door : doors) {
-    const Vec2 d = q - door.centre, u(std::cos(door.yaw_rad), std::sin(door.yaw_rad));
-    if (!door.open && on_floor_of(door.base_z) && above_floor < door.height &&
-        std::abs(d.dot(u)) < 0.5 * door.width && std::abs(d.x() * u.y() - d.y() * u.x()) < 0.2) {
+    const Rectangle leaf{door.centre, door.width, 2 * kBesideLeaf, door.yaw_rad};
+    if (!door.open && on_floor_of(door.base_z) && above_floor < door.height && leaf.reaches(q, 0)) {
       return SemanticClass::kDoor;
     }
   }

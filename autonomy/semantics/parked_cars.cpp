@@ -27,7 +27,7 @@ bool at_structure(const Vec3f& p, const UprightStructure& structure) {
     if (z > wall.base_z - 0.3 && z < wall.high && wall.distance(q) < kOffWall) return true;
   }
   return std::any_of(structure.pillars.begin(), structure.pillars.end(), [&](const Pillar& pillar) {
-    return z > pillar.base_z - 0.3 && z < pillar.top_z && pillar.box.distance(q) < kOffPillar;
+    return z > pillar.base_z - 0.3 && z < pillar.top_z && pillar.box.reaches(q, kOffPillar);
   });
 }
 
@@ -38,10 +38,12 @@ struct Cut {
   double untidiness = 0;  ///< of both parts
 };
 
-/// Cuts a group across an axis where it is thinnest, if that leaves two sensible parts.
-std::optional<Cut> cut(const std::vector<Vec3f>& points, const Group& group, const Vec2& axis,
-                       double least) {
-  constexpr double kBin = 0.1;
+/// Cuts a group across an axis where it is thin, each cut leaving two sensible parts. Where a car's
+/// sides are hidden it may be thinner than where it touches the next.
+std::vector<Cut> cuts_of(const std::vector<Vec3f>& points, const Group& group, const Vec2& axis,
+                         double least) {
+  constexpr double kBin = 0.1, kApart = 0.5;  // m
+  constexpr std::size_t kMost = 4;
   std::vector<double> at;
   for (const std::uint32_t i : group) at.push_back(flat(points[i]).dot(axis));
   const auto [low, high] = std::minmax_element(at.begin(), at.end());
@@ -49,17 +51,26 @@ std::optional<Cut> cut(const std::vector<Vec3f>& points, const Group& group, con
   std::vector<int> bins(static_cast<std::size_t>((*high - from) / kBin) + 1, 0);
   for (const double t : at) ++bins[static_cast<std::size_t>((t - from) / kBin)];
   const auto margin = static_cast<std::size_t>(least / kBin);
-  if (bins.size() < 2 * margin + 1) return std::nullopt;
-  std::size_t thinnest = margin;
-  for (std::size_t i = margin; i + margin < bins.size(); ++i) {
-    if (bins[i] < bins[thinnest]) thinnest = i;
+  if (bins.size() < 2 * margin + 1) return {};
+  std::vector<std::size_t> thin;
+  for (std::size_t i = margin; i + margin < bins.size(); ++i) thin.push_back(i);
+  std::stable_sort(thin.begin(), thin.end(),
+                   [&](std::size_t i, std::size_t j) { return bins[i] < bins[j]; });
+  std::vector<double> places;
+  std::vector<Cut> cuts;
+  for (const std::size_t bin : thin) {
+    const double where = from + (static_cast<double>(bin) + 0.5) * kBin;
+    const bool known = std::any_of(places.begin(), places.end(),
+                                   [&](double other) { return std::abs(where - other) < kApart; });
+    if (known || places.size() == kMost) continue;
+    places.push_back(where);
+    Cut parts;
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      (at[k] < where ? parts.first : parts.second).push_back(group[k]);
+    }
+    if (!parts.first.empty() && !parts.second.empty()) cuts.push_back(std::move(parts));
   }
-  Cut parts;
-  const double where = from + (static_cast<double>(thinnest) + 0.5) * kBin;
-  for (std::size_t k = 0; k < group.size(); ++k) {
-    (at[k] < where ? parts.first : parts.second).push_back(group[k]);
-  }
-  return parts;
+  return cuts;
 }
 
 /// How little a group looks like one car: the sum of the distances of its points from its best
@@ -86,14 +97,14 @@ void split(const std::vector<Vec3f>& points, Group group, const GarageConfig& co
     out.push_back(std::move(group));
     return;
   }
-  // Of the two ways, the one that leaves parts with cleaner outlines.
+  // Of the ways, the one that leaves parts with cleaner outlines.
   std::optional<Cut> best;
   for (const Vec2& axis : {box.along(), box.across()}) {
-    auto parts = cut(points, group, axis, kLeastPart);
-    if (!parts || parts->first.empty() || parts->second.empty()) continue;
-    parts->untidiness =
-        untidiness(points, parts->first, config) + untidiness(points, parts->second, config);
-    if (!best || parts->untidiness < best->untidiness) best = std::move(parts);
+    for (Cut& parts : cuts_of(points, group, axis, kLeastPart)) {
+      parts.untidiness =
+          untidiness(points, parts.first, config) + untidiness(points, parts.second, config);
+      if (!best || parts.untidiness < best->untidiness) best = std::move(parts);
+    }
   }
   if (!best) return;
   split(points, best->first, config, out);
@@ -127,6 +138,38 @@ bool is_cabinet(const Rectangle& box, const std::vector<Vec2>& low, const std::v
     best_depth = median(above) - median(below);
   }
   return most >= kFewest && best_depth < kFlush;
+}
+
+/// Whether a good part of a car lies in another.
+bool in_another(const ParkedCar& car, const ParkedCar& other) {
+  constexpr int kSteps = 10;
+  constexpr double kPart = 0.25, kStorey = 1.0;  // share, m
+  if (std::abs(car.base_z - other.base_z) > kStorey) return false;
+  const Vec2 u = car.box.length * car.box.along(), v = car.box.width * car.box.across();
+  int inside = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const Vec2 p =
+          car.box.centre + ((i + 0.5) / kSteps - 0.5) * u + ((j + 0.5) / kSteps - 0.5) * v;
+      inside += other.box.distance(p) < 0;
+    }
+  }
+  return inside > kPart * kSteps * kSteps;
+}
+
+/// Cars do not stand in each other: what was seen whole, or shows most, stays.
+std::vector<ParkedCar> without_overlaps(std::vector<ParkedCar> cars) {
+  std::stable_sort(cars.begin(), cars.end(), [](const ParkedCar& a, const ParkedCar& b) {
+    return a.whole != b.whole ? a.whole : a.points > b.points;
+  });
+  std::vector<ParkedCar> kept;
+  for (const ParkedCar& car : cars) {
+    const bool taken = std::any_of(kept.begin(), kept.end(), [&](const ParkedCar& other) {
+      return in_another(car, other) || in_another(other, car);
+    });
+    if (!taken) kept.push_back(car);
+  }
+  return kept;
 }
 
 /// Where the vehicle was nearest.
@@ -183,7 +226,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
                    const auto h = static_cast<double>(clearances.above_floor[i]);
                    const double floor = static_cast<double>(cloud.points[i].z()) - h;
                    if (std::abs(floor - car.base_z) < 0.4 && h > kCoreLow && h < kRoof &&
-                       car.box.distance(flat(cloud.points[i])) < 0.1) {
+                       car.box.reaches(flat(cloud.points[i]), 0.1)) {
                      heights.push_back(h);
                      if (h < kCoreHigh) low.push_back(flat(cloud.points[i]));
                      if (h > kCabin) high.push_back(flat(cloud.points[i]));
@@ -200,9 +243,17 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
       // Of an end, the whole width and a part of the sides or the bonnet.
       const bool is_end =
           car.box.length > 1.5 && car.box.length < config.car_max_width_m && car.box.width > 0.3;
-      if (!length_seen && !is_end) continue;
+      // Of a car whose far end is hidden, the width and half of the length.
+      const bool is_half = !length_seen && width_seen && car.box.length >= config.car_max_width_m;
+      if (!length_seen && !is_end && !is_half) continue;
       const Vec2 away = car.box.centre - viewer_of(car.box.centre, car.base_z, path);
-      if (!length_seen) {
+      if (is_half) {
+        car.whole = false;
+        Vec2 back = car.box.along();
+        if (away.dot(back) < 0) back = -back;
+        car.box.centre += 0.5 * (kUsualLength - car.box.length) * back;
+        car.box.length = kUsualLength;
+      } else if (!length_seen) {
         // The longer seen side is the car's end: it goes on behind it.
         car.whole = false;
         Vec2 back = car.box.across();
@@ -224,7 +275,7 @@ std::vector<ParkedCar> find_cars(const WorkingCloud& cloud, const Clearances& cl
       cars.push_back(car);
     }
   }
-  return cars;
+  return without_overlaps(std::move(cars));
 }
 
 }  // namespace arex

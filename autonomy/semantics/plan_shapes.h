@@ -23,6 +23,11 @@ struct Rectangle {
     const Vec2 d = p - centre;
     return std::max(std::abs(d.dot(along())) - length / 2, std::abs(d.dot(across())) - width / 2);
   }
+  /// Whether distance(p) < reach; without it for what is far off. @pre reach >= 0
+  [[nodiscard]] bool reaches(const Vec2& p, double reach) const {
+    const double most = 0.5 * (length + width) + 2 * reach;
+    return (p - centre).squaredNorm() < most * most && distance(p) < reach;
+  }
 };
 
 /// The rectangle of this direction that holds all points but `tail` of them at each side.

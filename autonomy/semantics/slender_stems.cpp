@@ -6,9 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <optional>
 
+#include "semantics/cone_sums.h"
 #include "semantics/layer_raster.h"
 
 namespace arex {
@@ -82,20 +84,23 @@ Line fit_line(const std::vector<Vec3>& points, const Vec2& foot) {
   constexpr double kSigma = 0.04;  // m, of a layer's points
   constexpr double kFaint = 0.2;   // weight of a layer that counts in full
   Line line{foot, Vec2::Zero()};
+  std::vector<double> weights(points.size());
   for (const double scale : kScales) {
     std::array<double, 32> of_layer{};
     const auto layer_of = [](const Vec3& p) {
       return std::min<std::size_t>(31, static_cast<std::size_t>(p.z() / LayerRaster::kLayer));
     };
-    for (const Vec3& p : points) {
-      if (p.z() <= kLineTop) of_layer[layer_of(p)] += geman_mcclure(line.distance(p), scale);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (points[i].z() > kLineTop) continue;
+      weights[i] = geman_mcclure(line.distance(points[i]), scale);
+      of_layer[layer_of(points[i])] += weights[i];
     }
     Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
     Eigen::Matrix2d b = Eigen::Matrix2d::Zero();  // one column for x, one for y
-    for (const Vec3& p : points) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vec3& p = points[i];
       if (p.z() > kLineTop) continue;
-      const double weight =
-          geman_mcclure(line.distance(p), scale) / std::max(kFaint, of_layer[layer_of(p)]);
+      const double weight = weights[i] / std::max(kFaint, of_layer[layer_of(p)]);
       const Vec2 row(1, p.z() - kMiddle);
       A += weight * row * row.transpose();
       b += weight * row * p.head<2>().transpose();
@@ -183,6 +188,8 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
   constexpr std::array kScales{0.04, 0.04, 0.04, 0.035, 0.03, 0.03, 0.025, 0.025, 0.025, 0.025};
   constexpr double kLargest = 0.3;  // m, radius
   constexpr double kPlace = 0.05;   // m, deviation of the start
+  constexpr double kAll = std::numeric_limits<float>::max();
+  const ConePoints columns(points, shaft.centre);
   const Vec2 start = shaft.centre, lean = shaft.lean;
   Vec6 weights;
   weights << kPlace, kPlace, prior.lean_sigma, prior.lean_sigma, prior.radius_sigma,
@@ -196,20 +203,9 @@ std::optional<Stem> fit_shaft(const std::vector<Vec3>& points, Stem shaft,
         prior.taper - shaft.taper;
     Mat6 A = weights.asDiagonal();
     Vec6 b = weights.cwiseProduct(off);
-    for (const Vec3& p : points) {
-      const double h = p.z() - kBreastHeight;
-      const Vec2 out = p.head<2>() - shaft.centre_at(p.z());
-      const double norm = out.norm();
-      if (norm < 1e-6) continue;
-      const double d = norm - (shaft.radius - shaft.taper * h);
-      const double weight = geman_mcclure(d, scale) / (kRangeNoise * kRangeNoise);
-      const Vec2 u = out / norm;
-      Vec6 row;
-      row << -u.x(), -u.y(), -u.x() * h, -u.y() * h, -1, h;
-      const Vec6 weighted = weight * row;
-      A.noalias() += weighted * row.transpose();
-      b -= weight * d * row;
-    }
+    const ConeSums sums = columns.sums(shaft, scale, kRangeNoise, kAll);
+    A += sums.A;
+    b += sums.b;
     const Vec6 step = A.ldlt().solve(b);
     if (!step.allFinite()) return std::nullopt;
     shaft.centre += step.head<2>();

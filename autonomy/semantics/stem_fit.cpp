@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "semantics/cone_sums.h"
 #include "semantics/pcl_models.h"
 
 namespace arex {
@@ -148,30 +149,14 @@ constexpr std::array kCoarse{0.10, 0.08, 0.07, 0.06, 0.05};
 constexpr std::array kFine{0.045, 0.04, 0.04, 0.035, 0.035, 0.03, 0.03};
 
 /// A step of reweighted least squares for each scale.
-Stem improve(std::span<const Vec3> points, Stem stem, const StemConfig& config,
+Stem improve(const ConePoints& points, Stem stem, const StemConfig& config,
              std::span<const double> scales) {
   constexpr double kSigma = 0.02;                // m, of a point
   constexpr double kLean = 0.15, kTaper = 0.01;  // deviations of the priors, per metre
   constexpr double kUsualTaper = 0.01;           // per metre
   const double most = config.max_diameter_m / 2;
   for (const double scale : scales) {
-    Mat6 A = Mat6::Zero();
-    Vec6 b = Vec6::Zero();
-    for (const Vec3& p : points) {
-      const double h = p.z() - kBreastHeight;
-      const Vec2 out = p.head<2>() - stem.centre_at(p.z());
-      const double norm = out.norm();
-      const double d = norm - (stem.radius - stem.taper * h);
-      if (std::abs(d) > 5 * scale || norm < 1e-6) continue;
-      const double ratio = d / scale;
-      const double weight = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));
-      const Vec2 u = out / norm;
-      Vec6 row;
-      row << -u.x(), -u.y(), -u.x() * h, -u.y() * h, -1, h;
-      const Vec6 weighted = weight / (kSigma * kSigma) * row;
-      A.noalias() += weighted * row.transpose();
-      b -= weight / (kSigma * kSigma) * d * row;
-    }
+    auto [A, b] = points.sums(stem, scale, kSigma, 5 * scale);
     Vec6 prior = Vec6::Zero(), sigma;
     sigma << 1, 1, kLean, kLean, 1, kTaper;
     prior << 0, 0, -stem.lean.x(), -stem.lean.y(), 0, kUsualTaper - stem.taper;
@@ -209,9 +194,10 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& abou
   // Most places of an orchard are leaves, many of them: a part of them tells so as well.
   const std::vector<Vec3> few = thinned(all, kEnough), more = thinned(all, kEnoughFine);
   const std::span<const Vec3> points = few;
+  const ConePoints coarse(few, about);
   std::vector<StemEvidence> begun;
   const auto begin = [&](const Stem& start) {
-    begun.push_back(weigh_stem(points, improve(points, start, config, kCoarse)));
+    begun.push_back(weigh_stem(points, improve(coarse, start, config, kCoarse)));
   };
   const auto by_score = [](const StemEvidence& a, const StemEvidence& b) {
     return a.score > b.score;
@@ -227,9 +213,10 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& abou
   if (begun.size() > kFollowed) begun.resize(kFollowed);
   // What is this far from a stem after the coarse steps does not become one by the fine ones.
   if (begun.front().confidence() < kNoStem) return std::nullopt;
+  const ConePoints fine(more, about);
   std::optional<StemEvidence> best;
   for (const StemEvidence& each : begun) {
-    const StemEvidence evidence = weigh_stem(all, improve(more, each.stem, config, kFine));
+    const StemEvidence evidence = weigh_stem(all, improve(fine, each.stem, config, kFine));
     if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }

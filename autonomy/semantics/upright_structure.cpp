@@ -226,8 +226,8 @@ bool reaches_down(const Rectangle& box, const ColumnIndex& index, const WorkingC
                static_cast<float>(reach), [&](std::uint32_t i) {
                  const double h = static_cast<double>(clearances.above_floor[i]);
                  const auto z = static_cast<double>(cloud.points[i].z());
-                 if (std::abs(z - h - base_z) > 0.5 || box.distance(flat(cloud.points[i])) > kSlack)
-                   return;
+                 if (std::abs(z - h - base_z) > 0.5) return;
+                 if (!box.reaches(flat(cloud.points[i]), kSlack)) return;
                  top = std::max(top, z);
                  const double layer = (h - kFrom) / kLayer;
                  if (layer >= 0 && layer < layers) filled[static_cast<std::size_t>(layer)] = true;
@@ -503,12 +503,15 @@ double floor_of(const WallFace& wall, const Band& band, const ColumnIndex& index
   return static_cast<double>(*mid);
 }
 
-/// Whether a wall goes on below the band, where a pipe or a beam does not; sets its top.
+/// Whether a wall goes on below the band, where a pipe or a beam does not; sets its top. The roofs
+/// of cars below a pipe lie at one height each, where a wall fills several.
 bool stands(WallFace& wall, const WorkingCloud& cloud, const ColumnIndex& all,
             const Clearances& clearances) {
   constexpr double kBin = 0.25, kFrom = 1.3, kTo = 1.95, kShare = 0.35, kNear = 0.12;
+  constexpr double kLayer = 0.15;  // m
+  constexpr int kFewest = 2;       // layers
   const auto count = static_cast<std::size_t>(wall.length() / kBin) + 1;
-  std::vector<std::uint8_t> filled(count, 0);
+  std::vector<std::uint8_t> layers(count, 0);
   float top = static_cast<float>(wall.high);
   for (std::size_t k = 0; k < count; ++k) {
     const Vec2 p = wall.a + (static_cast<double>(k) + 0.5) * kBin * wall.along();
@@ -518,15 +521,19 @@ bool stands(WallFace& wall, const WorkingCloud& cloud, const ColumnIndex& all,
                  const auto z = static_cast<double>(cloud.points[i].z());
                  if (!(std::abs(z - h - wall.base_z) < 1.0)) return;
                  if (wall.distance(flat(cloud.points[i])) > kNear) return;
-                 if (h > kFrom && h < kTo) filled[k] = 1;
+                 if (h > kFrom && h < kTo) {
+                   layers[k] |=
+                       static_cast<std::uint8_t>(1U << static_cast<unsigned>((h - kFrom) / kLayer));
+                 }
                  if (h <= static_cast<double>(clearances.room[i])) {
                    top = std::max(top, cloud.points[i].z());
                  }
                });
   }
   wall.high = static_cast<double>(top);
-  return static_cast<double>(std::count(filled.begin(), filled.end(), 1)) >=
-         kShare * static_cast<double>(count);
+  const auto filled = std::count_if(layers.begin(), layers.end(),
+                                    [](std::uint8_t bin) { return std::popcount(bin) >= kFewest; });
+  return static_cast<double>(filled) >= kShare * static_cast<double>(count);
 }
 
 }  // namespace

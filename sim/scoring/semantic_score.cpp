@@ -8,6 +8,7 @@
 #include <string>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 
 namespace arex::sim {
 namespace {
@@ -65,10 +66,24 @@ double harmonic(double a, double b) { return a + b > 0 ? 2 * a * b / (a + b) : 0
 class Nearness {
  public:
   Nearness(const std::vector<Vec3f>& cloud_O, const Pose& X_WO, double near_m) : near_(near_m) {
+    struct Keyed {
+      std::uint64_t key;
+      Vec3f p_W;
+    };
+    std::vector<Keyed> keyed;
+    keyed.reserve(cloud_O.size());
     for (const Vec3f& p : cloud_O) {
       if (!p.allFinite()) continue;
       const Vec3 p_W = X_WO * p.cast<double>();
-      cubes_[key(cube(p_W))].push_back(p_W.cast<float>());
+      keyed.push_back({key(cube(p_W)), p_W.cast<float>()});
+    }
+    std::sort(keyed.begin(), keyed.end(),
+              [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
+    points_.reserve(keyed.size());
+    for (const Keyed& each : keyed) {
+      const auto at = static_cast<std::uint32_t>(points_.size());
+      cubes_.try_emplace(each.key, at, at).first->second.second = at + 1;
+      points_.push_back(each.p_W);
     }
   }
   /// Distance to the nearest point up to the limit, infinite beyond.
@@ -79,8 +94,9 @@ class Nearness {
         for (int dz = -1; dz <= 1; ++dz) {
           const auto found = cubes_.find(key(c + Eigen::Vector3i(dx, dy, dz)));
           if (found == cubes_.end()) continue;
-          for (const Vec3f& q : found->second) {
-            if ((q.cast<double>() - p_W).norm() <= near_) return true;
+          const auto [first, last] = found->second;
+          for (std::uint32_t i = first; i < last; ++i) {
+            if ((points_[i].cast<double>() - p_W).norm() <= near_) return true;
           }
         }
       }
@@ -97,7 +113,8 @@ class Nearness {
     return part(c.x()) << 42 | part(c.y()) << 21 | part(c.z());
   }
   double near_;
-  std::unordered_map<std::uint64_t, std::vector<Vec3f>> cubes_;
+  std::vector<Vec3f> points_;  ///< in W, by cubes
+  std::unordered_map<std::uint64_t, std::pair<std::uint32_t, std::uint32_t>> cubes_;
 };
 
 struct Triangle {
@@ -206,8 +223,8 @@ std::vector<Group> groups_of(const World& world, SurfaceClass kind, bool merge) 
     Group group;
     group.add(triangles);
     const auto same = [&](const Group& other) {
-      if (kind == SurfaceClass::kDoor) {  // a leaf and its frame
-        constexpr double kHinge = 0.15;   // m
+      if (kind == SurfaceClass::kDoor) {  // a leaf and its frame, a wall's thickness apart
+        constexpr double kHinge = 0.25;   // m
         Eigen::AlignedBox3d wide = other.box;
         wide.min().array() -= kHinge;
         wide.max().array() += kHinge;

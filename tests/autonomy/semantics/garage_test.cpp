@@ -241,6 +241,57 @@ TEST(GarageMap, ChoosesTheSceneFromTheCloudUnlessItIsNamed) {
   EXPECT_EQ(build_semantic_map(garage.points, {}, config).scene, SceneKind::kGarage);
 }
 
+/// A hall of 20 x 16 m with a room behind a wall of 0.2 m along y = 10, seen from both sides. In
+/// it from left to right: a shut door set back by 7 cm at x = 4, a doorway at x = 10, both 1.4 m
+/// wide and 2.2 m high, and from x = 14 to 16.5 a part whose lower 2 m cabinets hide on both sides.
+AnalyticGarage hall_with_doors(double yaw, double drift_m) {
+  AnalyticGarage hall(yaw, {3, -2, 1}, 7);
+  constexpr double kHeight = AnalyticGarage::kHeight, kHead = 2.2;  // m
+  hall.face({0, 0, 0}, {20, 0, 0}, {0, 9.9, 0});
+  hall.face({0, 10.1, 0}, {20, 0, 0}, {0, 5.9, 0});
+  hall.face({0, 0, kHeight}, {20, 0, 0}, {0, 16, 0});
+  hall.face({0, 0, 0}, {20, 0, 0}, {0, 0, kHeight});
+  hall.face({0, 16, 0}, {20, 0, 0}, {0, 0, kHeight});
+  for (const double x : {0.0, 20.0}) hall.face({x, 0, 0}, {0, 16, 0}, {0, 0, kHeight});
+  for (const double side : {-1.0, 1.0}) {
+    const double y = 10 + 0.1 * side;
+    const auto wall = [&](double from, double to, double low, double high, double off) {
+      hall.face({from, y - side * off, low}, {to - from, 0, 0}, {0, 0, high - low});
+    };
+    // What was seen below the doors' heads is off what was seen above them.
+    wall(0, 20, kHead, kHeight, drift_m * side);
+    wall(0, 3.3, 0, kHead, 0);
+    wall(3.3, 4.7, 0, kHead, 0.07);
+    wall(4.7, 9.3, 0, kHead, 0);
+    wall(10.7, 14, 0, kHead, 0);
+    wall(14, 16.5, 2, kHead, 0);
+    wall(16.5, 20, 0, kHead, 0);
+    hall.box({14, y + std::min(0.25 * side, 0.8 * side), 0},
+             {16.5, y + std::max(0.25 * side, 0.8 * side), 2}, true);
+  }
+  for (const double x : {9.3, 10.7}) hall.face({x, 9.9, 0}, {0, 0.2, 0}, {0, 0, kHead});
+  hall.face({9.3, 9.9, 0}, {1.4, 0, 0}, {0, 0.2, 0});
+  return hall;
+}
+
+TEST(GarageMap, FindsDoorsShutAndOpenButNoneBehindCabinets) {
+  for (const double yaw : {0.0, 0.7}) {
+    for (const double drift : {0.0, 0.02}) {
+      const AnalyticGarage hall = hall_with_doors(yaw, drift);
+      const SemanticMap map = build_semantic_map(hall.points, {}, {});
+      ASSERT_EQ(map.scene, SceneKind::kGarage);
+      EXPECT_EQ(map.count(SemanticClass::kDoor), 2u) << yaw << ' ' << drift;
+      for (const double x : {4.0, 10.0}) {
+        const Vec2 p = hall.place({x, 10, 0}).head<2>();
+        const SemanticObject* found = nearest(map, SemanticClass::kDoor, p);
+        ASSERT_NE(found, nullptr);
+        EXPECT_LT((found->position.head<2>() - p).norm(), 0.2) << x;  // half a wall, a bin
+        EXPECT_NEAR(found->size.x(), 1.4, 0.21) << x;                 // bins of 0.1 m
+      }
+    }
+  }
+}
+
 TEST(PlanShapes, FitsARectangleToThreeSides) {
   for (const double yaw : {0.0, 0.3, 1.2, 2.5}) {
     RandomStream random(1, "rectangle");

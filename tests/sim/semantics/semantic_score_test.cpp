@@ -114,6 +114,26 @@ TEST(SemanticScore, IsPerfectForTheTruth) {
   EXPECT_TRUE(std::isnan(score.of(SemanticClass::kWall).size_median_m));
 }
 
+TEST(SemanticScore, CountsALeafThatStandsOpenAndItsFrameAsOneDoor) {
+  worlds::MeshBuilder builder;
+  const auto box = [&](const Vec3& low, const Vec3& high) {
+    builder.add_box(builder.add_object(SurfaceClass::kDoor, 0.3),
+                    {Mat3::Identity(), 0.5 * (low + high)}, 0.5 * (high - low));
+  };
+  // Hung on the far side of a wall of 0.2 m; the frame is a lintel here.
+  box({-0.05, 0.1, 0}, {0, 1.5, 2.2});
+  box({-0.08, -0.12, 2.2}, {1.48, -0.1, 2.28});
+  box({5, -0.1, 0}, {6.1, -0.06, 2.2});
+  Case example;
+  example.world = builder.finish();
+  example.add(SemanticClass::kDoor, {0.7, 0, 1.05}, {1.4, 0, 2.1});
+  example.add(SemanticClass::kDoor, {5.55, 0, 1.05}, {1.1, 0, 2.1});
+  const ClassScore& doors = example.score().of(SemanticClass::kDoor);
+  EXPECT_EQ(doors.mapped, 2u);
+  EXPECT_EQ(doors.right, 2u);
+  EXPECT_EQ(doors.f1, 1);
+}
+
 TEST(SemanticScore, MeasuresWhatIsOff) {
   Case example;
   example.add_everything();

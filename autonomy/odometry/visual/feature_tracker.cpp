@@ -13,6 +13,8 @@ namespace {
 
 using Pyramid = std::vector<cv::Mat>;
 
+constexpr double kSameExposure = 0.01;  // relative
+
 cv::Point2f to_cv(const Vec2& p) { return {static_cast<float>(p.x()), static_cast<float>(p.y())}; }
 
 Vec2 from_cv(const cv::Point2f& p) { return {static_cast<double>(p.x), static_cast<double>(p.y)}; }
@@ -31,6 +33,7 @@ struct FeatureTracker::Impl {
   std::uint64_t exposures = 0;
   std::int64_t next_id = 0;
   Pyramid before;
+  double exposed_before = 0;  ///< exposure times gain of that, s; 0: not known
   std::vector<ImageFeature> features;
 
   [[nodiscard]] Vec2 normalised(const Vec2& px) const {
@@ -47,6 +50,7 @@ struct FeatureTracker::Impl {
   }
 
   [[nodiscard]] Pyramid pyramid_of(const cv::Mat& image) const;
+  [[nodiscard]] Pyramid brightened(const cv::Mat& image, double by) const;
   [[nodiscard]] std::vector<std::optional<Vec2>> follow(const Pyramid& from, const Pyramid& to,
                                                         const std::vector<Vec2>& points,
                                                         const std::vector<Vec2>& guesses) const;
@@ -58,7 +62,7 @@ struct FeatureTracker::Impl {
 
 FeatureTracker::FeatureTracker(const FeatureTrackerConfig& config, std::uint64_t seed)
     : impl_(std::make_unique<Impl>(
-          Impl{config, RandomStream(seed, "feature tracker"), {}, 0, 0, {}, {}})) {
+          Impl{config, RandomStream(seed, "feature tracker"), {}, 0, 0, {}, 0, {}})) {
   cv::setNumThreads(1);  // the flight's jobs are what runs side by side
 }
 FeatureTracker::~FeatureTracker() = default;
@@ -78,7 +82,16 @@ FeatureFrame FeatureTracker::track(const StereoImage& images, const Mat3& turn) 
   my.camera = images.camera;
   const cv::Mat left = view(images.left, images.width, images.height);
   Pyramid now = my.pyramid_of(left);
-  if (!my.before.empty()) my.follow_in_time(now, turn);
+  const double exposed = images.exposure_s * images.gain;
+  if (!my.before.empty()) {
+    // Patches are compared by their grey values: the darker image is brought to the other's
+    // exposure, and what that one has overexposed is white in both.
+    const bool known = exposed > 0 && my.exposed_before > 0;
+    const double brighter = known ? exposed / my.exposed_before : 1;
+    if (brighter > 1 + kSameExposure) my.before = my.brightened(my.before.front(), brighter);
+    const bool darker = 1 / brighter > 1 + kSameExposure;
+    my.follow_in_time(darker ? my.brightened(now.front(), 1 / brighter) : now, turn);
+  }
   ++my.exposures;
   my.detect(left);
   for (ImageFeature& feature : my.features) feature.right_px.reset();
@@ -86,6 +99,7 @@ FeatureFrame FeatureTracker::track(const StereoImage& images, const Mat3& turn) 
     my.look_right(now, my.pyramid_of(view(images.right, images.width, images.height)));
   }
   my.before = std::move(now);
+  my.exposed_before = exposed;
 
   FeatureFrame frame;
   frame.stamp = images.time_ns;
@@ -106,6 +120,16 @@ Pyramid FeatureTracker::Impl::pyramid_of(const cv::Mat& image) const {
   cv::buildOpticalFlowPyramid(image, pyramid, patch, config.pyramid_levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   return pyramid;
+}
+
+Pyramid FeatureTracker::Impl::brightened(const cv::Mat& image, double by) const {
+  cv::Mat grey(1, 256, CV_8UC1), brighter;
+  for (int value = 0; value < 256; ++value) {
+    grey.at<std::uint8_t>(value) =
+        static_cast<std::uint8_t>(std::lround(std::min(255.0, by * value)));
+  }
+  cv::LUT(image, grey, brighter);
+  return pyramid_of(brighter);
 }
 
 std::vector<std::optional<Vec2>> FeatureTracker::Impl::follow(

@@ -13,7 +13,12 @@ namespace {
 
 using Pyramid = std::vector<cv::Mat>;
 
-constexpr double kSameExposure = 0.01;  // relative
+// What counts for how much brighter an image is than the one before: pixels of a coarse level that
+// are neither black nor white in either of them, as many of them at least.
+constexpr int kBrightnessLevel = 3;
+constexpr int kBlack = 16, kWhite = 245;
+constexpr std::size_t kLeastPixels = 100;
+constexpr double kSameBrightness = 0.03;  // relative
 
 cv::Point2f to_cv(const Vec2& p) { return {static_cast<float>(p.x()), static_cast<float>(p.y())}; }
 
@@ -33,7 +38,6 @@ struct FeatureTracker::Impl {
   std::uint64_t exposures = 0;
   std::int64_t next_id = 0;
   Pyramid before;
-  double exposed_before = 0;  ///< exposure times gain of that, s; 0: not known
   std::vector<ImageFeature> features;
 
   [[nodiscard]] Vec2 normalised(const Vec2& px) const {
@@ -50,6 +54,7 @@ struct FeatureTracker::Impl {
   }
 
   [[nodiscard]] Pyramid pyramid_of(const cv::Mat& image) const;
+  [[nodiscard]] double brightness_over_before(const Pyramid& now, const Mat3& turn) const;
   [[nodiscard]] Pyramid brightened(const cv::Mat& image, double by) const;
   [[nodiscard]] std::vector<std::optional<Vec2>> follow(const Pyramid& from, const Pyramid& to,
                                                         const std::vector<Vec2>& points,
@@ -62,7 +67,7 @@ struct FeatureTracker::Impl {
 
 FeatureTracker::FeatureTracker(const FeatureTrackerConfig& config, std::uint64_t seed)
     : impl_(std::make_unique<Impl>(
-          Impl{config, RandomStream(seed, "feature tracker"), {}, 0, 0, {}, 0, {}})) {
+          Impl{config, RandomStream(seed, "feature tracker"), {}, 0, 0, {}, {}})) {
   cv::setNumThreads(1);  // the flight's jobs are what runs side by side
 }
 FeatureTracker::~FeatureTracker() = default;
@@ -82,14 +87,12 @@ FeatureFrame FeatureTracker::track(const StereoImage& images, const Mat3& turn) 
   my.camera = images.camera;
   const cv::Mat left = view(images.left, images.width, images.height);
   Pyramid now = my.pyramid_of(left);
-  const double exposed = images.exposure_s * images.gain;
   if (!my.before.empty()) {
     // Patches are compared by their grey values: the darker image is brought to the other's
     // exposure, and what that one has overexposed is white in both.
-    const bool known = exposed > 0 && my.exposed_before > 0;
-    const double brighter = known ? exposed / my.exposed_before : 1;
-    if (brighter > 1 + kSameExposure) my.before = my.brightened(my.before.front(), brighter);
-    const bool darker = 1 / brighter > 1 + kSameExposure;
+    const double brighter = my.brightness_over_before(now, turn);
+    if (brighter > 1 + kSameBrightness) my.before = my.brightened(my.before.front(), brighter);
+    const bool darker = 1 / brighter > 1 + kSameBrightness;
     my.follow_in_time(darker ? my.brightened(now.front(), 1 / brighter) : now, turn);
   }
   ++my.exposures;
@@ -99,7 +102,6 @@ FeatureFrame FeatureTracker::track(const StereoImage& images, const Mat3& turn) 
     my.look_right(now, my.pyramid_of(view(images.right, images.width, images.height)));
   }
   my.before = std::move(now);
-  my.exposed_before = exposed;
 
   FeatureFrame frame;
   frame.stamp = images.time_ns;
@@ -120,6 +122,32 @@ Pyramid FeatureTracker::Impl::pyramid_of(const cv::Mat& image) const {
   cv::buildOpticalFlowPyramid(image, pyramid, patch, config.pyramid_levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   return pyramid;
+}
+
+/// By how much the exposure has changed, as most of the pixels have it whose place the turn tells.
+double FeatureTracker::Impl::brightness_over_before(const Pyramid& now, const Mat3& turn) const {
+  const int level = std::min(kBrightnessLevel, static_cast<int>(now.size()) / 2 - 1);
+  const cv::Mat& here = now[static_cast<std::size_t>(2 * level)];  // derivatives lie between levels
+  const cv::Mat& there = before[static_cast<std::size_t>(2 * level)];
+  const double scale = 1 << level;
+  std::vector<double> ratios;
+  for (int v = 0; v < there.rows; ++v) {
+    for (int u = 0; u < there.cols; ++u) {
+      const int was = there.at<std::uint8_t>(v, u);
+      if (was < kBlack || was > kWhite) continue;
+      const Vec3 ray = turn.transpose() * normalised(scale * Vec2(u, v)).homogeneous();
+      if (ray.z() <= 0) continue;
+      const Vec2 at = pixel(ray) / scale;
+      const double x = std::round(at.x()), y = std::round(at.y());
+      if (!(x >= 0 && y >= 0 && x < here.cols && y < here.rows)) continue;
+      const int is = here.at<std::uint8_t>(static_cast<int>(y), static_cast<int>(x));
+      if (is >= kBlack && is <= kWhite) ratios.push_back(static_cast<double>(is) / was);
+    }
+  }
+  if (ratios.size() < kLeastPixels) return 1;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
 }
 
 Pyramid FeatureTracker::Impl::brightened(const cv::Mat& image, double by) const {

@@ -152,7 +152,6 @@ TEST(FeatureTracker, IsHeldInAFastTurnByTheGyro) {
 TEST(FeatureTracker, FollowsThroughAStepOfTheExposure) {
   const auto shot = [](std::int64_t time_ns, const Vec2& shift, double exposure_s) {
     StereoImage image = poster(time_ns, shift, 6);
-    image.exposure_s = exposure_s;
     for (std::uint8_t& grey : image.left) {
       grey = static_cast<std::uint8_t>(std::lround(std::min(255.0, grey * exposure_s / 0.004)));
     }

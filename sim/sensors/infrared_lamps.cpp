@@ -13,8 +13,11 @@ using worlds::SurfaceClass;
 constexpr float kLong = 1.5F, kWide = 0.2F, kTall = 0.08F, kHighest = 1.5F;
 constexpr float kTolerance = 0.02F;
 
-constexpr double kSpacing = 5.0;  // of lamps where the world draws none, m
-constexpr double kBelow = 0.1;    // they hang under the ceiling, m
+// Where the world draws none: places are looked at every kStep, and lit from a lamp in sight within
+// kApart, which leaves no floor much below the 15 lx that DIN 67528 wants of a large car park.
+constexpr double kStep = 2.5, kApart = 6.0;  // m
+constexpr double kBelow = 0.1;               // they hang under the ceiling, m
+constexpr double kSight = 1.5;               // below it beams do not hide a lamp, m
 constexpr int kMostStoreys = 16;
 constexpr std::size_t kMostLamps = 4000;
 
@@ -55,7 +58,21 @@ bool has_ceiling(const worlds::World& world) {
   });
 }
 
-/// One below every ceiling over (x, y).
+/// Whether a lamp is missing at a place under a ceiling: none of `lamps` lights it, and it would
+/// not hang right above a duct.
+bool wants_lamp(const Scene& scene, const Vec3& under_ceiling, const std::vector<Lamp>& lamps) {
+  if (scene.cast(under_ceiling, -Vec3::UnitZ(), kSight).valid()) return false;
+  const Vec3 from = under_ceiling - kSight * Vec3::UnitZ();
+  return std::none_of(lamps.begin(), lamps.end(), [&](const Lamp& lamp) {
+    if ((lamp.centre_W - under_ceiling).norm() > kApart) return false;
+    constexpr double kOwn = 0.2;  // its own box is not in its way, m
+    const Vec3 to = lamp.centre_W - from;
+    const double distance = to.norm();
+    return distance < kOwn || !scene.cast(from, to / distance, distance - kOwn).valid();
+  });
+}
+
+/// One below every ceiling over (x, y) that wants it.
 void add_lamps_over(const worlds::World& world, const Scene& scene, double x, double y,
                     std::vector<Lamp>& lamps) {
   Vec3 from(x, y, world.bounds.low.z() - 1);
@@ -64,7 +81,8 @@ void add_lamps_over(const worlds::World& world, const Scene& scene, double x, do
     if (!hit.valid()) return;
     from.z() += hit.distance_m;
     if (world.objects[hit.object].surface_class == SurfaceClass::kCeiling) {
-      lamps.push_back({from - kBelow * Vec3::UnitZ(), Hit::kNone, 0});
+      const Vec3 place = from - kBelow * Vec3::UnitZ();
+      if (wants_lamp(scene, place, lamps)) lamps.push_back({place, Hit::kNone, 0});
       from.z() += 0.5;  // the slab's upper face
     }
     from.z() += 0.02;
@@ -75,10 +93,10 @@ void add_lamps_over(const worlds::World& world, const Scene& scene, double x, do
 
 std::vector<Lamp> find_lamps(const worlds::World& world, const Scene& scene) {
   std::vector<Lamp> lamps = drawn_lamps(world);
-  if (!lamps.empty() || !has_ceiling(world)) return lamps;
+  if (!has_ceiling(world)) return lamps;
   const Vec3 low = world.bounds.low, high = world.bounds.high;
-  for (double y = low.y() + 0.5 * kSpacing; y < high.y(); y += kSpacing) {
-    for (double x = low.x() + 0.5 * kSpacing; x < high.x(); x += kSpacing) {
+  for (double y = low.y() + 0.5 * kStep; y < high.y(); y += kStep) {
+    for (double x = low.x() + 0.5 * kStep; x < high.x(); x += kStep) {
       if (lamps.size() < kMostLamps) add_lamps_over(world, scene, x, y, lamps);
     }
   }

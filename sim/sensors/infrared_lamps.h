@@ -15,8 +15,8 @@ struct Lamp {
   float glow_below_m = 0;             ///< its triangles up to this height in W shine, not its rods
 };
 
-/// The lamps of a world: what hangs there in the form of one, or, under ceilings in whose world
-/// nothing does, one every few metres. A world without ceilings has none.
+/// The lamps of a world: what hangs there in the form of one, and under ceilings that those leave
+/// in the dark one every few metres. A world without ceilings has no more than it draws.
 std::vector<Lamp> find_lamps(const worlds::World& world, const Scene& scene);
 
 }  // namespace arex::sim

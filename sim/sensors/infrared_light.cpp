@@ -12,7 +12,7 @@ constexpr double kReach = 60;               // of a ray, m
 constexpr std::size_t kMostNodes = 40'000;  // a second or two of rays
 constexpr double kLeastSide = 1;            // of a world, m
 constexpr int kMostAlong = 400;             // an axis
-constexpr double kLampReach = 9;            // further lamps give less than 2 lx, m
+constexpr double kLeastLamp = 0.05;         // less of one lamp is not followed, lx
 constexpr double kLampNearest = 1.0;        // a strip is no point: nearer counts as this, m
 constexpr double kLampUp = 0.05;            // its intensity upwards, of that straight down
 constexpr double kLampLevel = 0.25;         // and just below the level
@@ -109,15 +109,17 @@ class Baker {
   void add_lamp(const Lamp& lamp, const Vec3& p, Faces& faces) const {
     const Vec3 to = lamp.centre_W - p;
     const double distance = to.norm();
-    if (distance > kLampReach || distance < 1e-3) return;
+    if (distance < 1e-3) return;
     const Vec3 direction = to / distance;
-    // Its own box is not in its way.
-    constexpr double kOwn = 0.2;
-    if (distance > kOwn && scene_.cast(p, direction, distance - kOwn).valid()) return;
     const double down = direction.z();
     const double towards = down > 0 ? kLampLevel + (1 - kLampLevel) * down : kLampUp;
     const double far = std::max(distance, kLampNearest);
-    add_from(direction, intensity_ * towards / (far * far), faces);
+    const double lux = intensity_ * towards / (far * far);
+    if (lux < kLeastLamp) return;
+    // Its own box is not in its way.
+    constexpr double kOwn = 0.2;
+    if (distance > kOwn && scene_.cast(p, direction, distance - kOwn).valid()) return;
+    add_from(direction, lux, faces);
   }
   [[nodiscard]] double illuminance(const RayHit& hit, const Vec3f& from, const Vec3f& direction,
                                    const LightGrid& grid) const {

@@ -13,6 +13,13 @@ namespace {
 
 using Pyramid = std::vector<cv::Mat>;
 
+// What counts for how much brighter an image is than the one before: pixels of a coarse level that
+// are neither black nor white in either of them, as many of them at least.
+constexpr int kBrightnessLevel = 3;
+constexpr int kBlack = 16, kWhite = 245;
+constexpr std::size_t kLeastPixels = 100;
+constexpr double kSameBrightness = 0.03;  // relative
+
 cv::Point2f to_cv(const Vec2& p) { return {static_cast<float>(p.x()), static_cast<float>(p.y())}; }
 
 Vec2 from_cv(const cv::Point2f& p) { return {static_cast<double>(p.x), static_cast<double>(p.y)}; }
@@ -47,6 +54,8 @@ struct FeatureTracker::Impl {
   }
 
   [[nodiscard]] Pyramid pyramid_of(const cv::Mat& image) const;
+  [[nodiscard]] double brightness_over_before(const Pyramid& now, const Mat3& turn) const;
+  [[nodiscard]] Pyramid brightened(const cv::Mat& image, double by) const;
   [[nodiscard]] std::vector<std::optional<Vec2>> follow(const Pyramid& from, const Pyramid& to,
                                                         const std::vector<Vec2>& points,
                                                         const std::vector<Vec2>& guesses) const;
@@ -78,7 +87,14 @@ FeatureFrame FeatureTracker::track(const StereoImage& images, const Mat3& turn) 
   my.camera = images.camera;
   const cv::Mat left = view(images.left, images.width, images.height);
   Pyramid now = my.pyramid_of(left);
-  if (!my.before.empty()) my.follow_in_time(now, turn);
+  if (!my.before.empty()) {
+    // Patches are compared by their grey values: the darker image is brought to the other's
+    // exposure, and what that one has overexposed is white in both.
+    const double brighter = my.brightness_over_before(now, turn);
+    if (brighter > 1 + kSameBrightness) my.before = my.brightened(my.before.front(), brighter);
+    const bool darker = 1 / brighter > 1 + kSameBrightness;
+    my.follow_in_time(darker ? my.brightened(now.front(), 1 / brighter) : now, turn);
+  }
   ++my.exposures;
   my.detect(left);
   for (ImageFeature& feature : my.features) feature.right_px.reset();
@@ -106,6 +122,42 @@ Pyramid FeatureTracker::Impl::pyramid_of(const cv::Mat& image) const {
   cv::buildOpticalFlowPyramid(image, pyramid, patch, config.pyramid_levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   return pyramid;
+}
+
+/// By how much the exposure has changed, as most of the pixels have it whose place the turn tells.
+double FeatureTracker::Impl::brightness_over_before(const Pyramid& now, const Mat3& turn) const {
+  const int level = std::min(kBrightnessLevel, static_cast<int>(now.size()) / 2 - 1);
+  const cv::Mat& here = now[static_cast<std::size_t>(2 * level)];  // derivatives lie between levels
+  const cv::Mat& there = before[static_cast<std::size_t>(2 * level)];
+  const double scale = 1 << level;
+  std::vector<double> ratios;
+  for (int v = 0; v < there.rows; ++v) {
+    for (int u = 0; u < there.cols; ++u) {
+      const int was = there.at<std::uint8_t>(v, u);
+      if (was < kBlack || was > kWhite) continue;
+      const Vec3 ray = turn.transpose() * normalised(scale * Vec2(u, v)).homogeneous();
+      if (ray.z() <= 0) continue;
+      const Vec2 at = pixel(ray) / scale;
+      const double x = std::round(at.x()), y = std::round(at.y());
+      if (!(x >= 0 && y >= 0 && x < here.cols && y < here.rows)) continue;
+      const int is = here.at<std::uint8_t>(static_cast<int>(y), static_cast<int>(x));
+      if (is >= kBlack && is <= kWhite) ratios.push_back(static_cast<double>(is) / was);
+    }
+  }
+  if (ratios.size() < kLeastPixels) return 1;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+Pyramid FeatureTracker::Impl::brightened(const cv::Mat& image, double by) const {
+  cv::Mat grey(1, 256, CV_8UC1), brighter;
+  for (int value = 0; value < 256; ++value) {
+    grey.at<std::uint8_t>(value) =
+        static_cast<std::uint8_t>(std::lround(std::min(255.0, by * value)));
+  }
+  cv::LUT(image, grey, brighter);
+  return pyramid_of(brighter);
 }
 
 std::vector<std::optional<Vec2>> FeatureTracker::Impl::follow(

@@ -147,6 +147,38 @@ TEST(FeatureTracker, IsHeldInAFastTurnByTheGyro) {
   EXPECT_GT(with, 3 * without);
 }
 
+// Auto exposure on the way out of the light: twice the exposure from one image to the next, and
+// back.
+TEST(FeatureTracker, FollowsThroughAStepOfTheExposure) {
+  const auto shot = [](std::int64_t time_ns, const Vec2& shift, double exposure_s) {
+    StereoImage image = poster(time_ns, shift, 6);
+    for (std::uint8_t& grey : image.left) {
+      grey = static_cast<std::uint8_t>(std::lround(std::min(255.0, grey * exposure_s / 0.004)));
+    }
+    image.right.clear();
+    return image;
+  };
+  FeatureTracker tracker(small_cells(), 1);
+  const Vec2 step(2.3, -1.6);
+  std::map<std::int64_t, Vec2> before;
+  int number = 0;
+  for (const double exposure_s : {0.002, 0.004, 0.004, 0.002}) {
+    static_cast<void>(
+        tracker.track(shot(100 * number, number * step, exposure_s), Mat3::Identity()));
+    int followed = 0;
+    for (const ImageFeature& f : tracker.features()) {
+      const auto was = before.find(f.id);
+      if (was == before.end()) continue;
+      ++followed;
+      EXPECT_LT((f.left_px - was->second - step).norm(), 0.2) << number;
+    }
+    EXPECT_GE(followed, 0.8 * static_cast<double>(before.size())) << number;
+    before.clear();
+    for (const ImageFeature& f : tracker.features()) before[f.id] = f.left_px;
+    ++number;
+  }
+}
+
 TEST(FeatureTracker, SeesNothingInAGreyImage) {
   FeatureTracker tracker(small_cells(), 1);
   StereoImage grey = poster(0, {0, 0}, 6);

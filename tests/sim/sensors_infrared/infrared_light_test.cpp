@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "../sensors_depth/depth_scenes.h"
 #include "sensors/infrared_lamps.h"
@@ -132,20 +134,51 @@ TEST(LightGrid, AClosedRoomWithoutLampsIsDark) {
   EXPECT_LT(up_facing(grid, {0, 0, 1.5}), 1);
 }
 
-TEST(Lamps, AreThoseThatTheGarageHangsUp) {
+TEST(Lamps, AreThoseThatTheGarageHangsUpAndOnesInTheDarkBetween) {
   const worlds::World world = worlds::build(worlds::GarageRecipe{}, 1);
   const Scene scene(world);
   const std::vector<Lamp> lamps = find_lamps(world, scene);
-  EXPECT_GT(lamps.size(), 30U);
+  const auto drawn = std::count_if(lamps.begin(), lamps.end(),
+                                   [](const Lamp& lamp) { return lamp.object != Hit::kNone; });
+  EXPECT_GT(drawn, 30);
+  EXPECT_GT(std::ssize(lamps), drawn);
   const worlds::GarageRecipe recipe;
   for (const Lamp& lamp : lamps) {
-    EXPECT_LT(lamp.centre_W.z(), recipe.ceiling_z_m);
-    EXPECT_GT(lamp.centre_W.z(), recipe.ceiling_z_m - 1);
+    if (lamp.object != Hit::kNone) {  // the others light the ramp's tunnel and the kiosk as well
+      EXPECT_LT(lamp.centre_W.z(), recipe.ceiling_z_m);
+      EXPECT_GT(lamp.centre_W.z(), recipe.ceiling_z_m - 1);
+    }
     // Nothing but air between it and what drives there.
     const Hit below = scene.cast(lamp.centre_W - Vec3(0, 0, 0.01), -Vec3::UnitZ(), 10);
     EXPECT_GT(below.distance_m, 0.5);
   }
   EXPECT_TRUE(find_lamps(small_forest(1), Scene(small_forest(1))).empty());
+}
+
+// DIN 67528: 15 lx at least in a large car park, 75 lx on its lanes (EN 12464-1). Under and between
+// parked cars it may be darker.
+TEST(Lamps, LeaveNoPartOfAGarageDark) {
+  worlds::GarageRecipe recipe;
+  recipe.length_m = 50;
+  recipe.width_m = 30;  // lanes, and with them drawn lamps, along its middle alone
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const worlds::World world = worlds::build(recipe, seed);
+    const Scene scene(world);
+    const InfraredLightConfig light;
+    const LightGrid grid(light, world, scene, SunMap(light, world), find_lamps(world, scene));
+    std::vector<double> lux;
+    for (double y = -14; y <= 14; y += 1) {
+      for (double x = 16; x <= 49; x += 1) {
+        const Vec3 p(x, y, recipe.floor_z_m + 0.4);
+        if (!scene.cast(p, Vec3::UnitZ(), 1.5).valid()) lux.push_back(up_facing(grid, p));
+      }
+    }
+    std::sort(lux.begin(), lux.end());
+    ASSERT_GT(lux.size(), 500U);
+    EXPECT_GT(lux[lux.size() / 10], 5) << seed;
+    EXPECT_GT(lux[lux.size() / 2], 15) << seed;
+    EXPECT_LT(lux[lux.size() / 2], 75) << seed;
+  }
 }
 
 TEST(Texture, IsOneOnAverageAndFadesWhereThePixelsAreCoarse) {

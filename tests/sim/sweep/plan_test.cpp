@@ -309,7 +309,7 @@ TEST(ShippedSweeps, ExpandToWhatTheirCommentsSay) {
   EXPECT_EQ(runs("odometry"), 10u);
   EXPECT_EQ(runs("explore"), 20u);
   EXPECT_EQ(runs("direction"), 320u);
-  EXPECT_EQ(runs("printed"), 520u);
+  EXPECT_EQ(runs("printed"), 560u);
   EXPECT_EQ(runs("faults_blind"), 66u);
 }
 

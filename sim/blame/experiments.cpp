@@ -71,21 +71,9 @@ bool is_sensor(const std::string& device) {
   return part != FaultyPart::kMotor && part != FaultyPart::kEsc && part != FaultyPart::kBattery;
 }
 
-void clean_devices(ConfigNode& scenario) {
-  ConfigNode* devices = find(scenario, "devices");
-  if (!devices) return;
-  std::vector<std::string> cleaned;
-  for (ConfigNode::Entry& entry : devices->entries) {
-    const std::string type = scalar_at(entry.value, {"type"});
-    if (type == "mid360") keep_only(entry.value, kOfLidar);
-    if (type == "d430") keep_only(entry.value, kOfCamera);
-    if (type == "spinning") keep_only(entry.value, kOfSpinning);
-    if (type != "survey") cleaned.push_back(entry.key);
-  }
-  for (const std::string& name : cleaned) set(scenario, "devices." + name + ".noise_free=true");
-}
-
-bool clean_sensors(ConfigNode& scenario) {
+/// What their makers sell: nothing but what the scenario chose of them, no fault, mounted where
+/// they are believed to be.
+void sell_sensors(ConfigNode& scenario) {
   if (ConfigNode* imu = find(scenario, "imu")) keep_only(*imu, kOfImu);
   if (ConfigNode* lidar = find(scenario, "lidar")) keep_only(*lidar, kOfLidar);
   if (ConfigNode* depth = find(scenario, "depth")) keep_only(*depth, kOfCamera);
@@ -97,10 +85,25 @@ bool clean_sensors(ConfigNode& scenario) {
     erase(*physics, "lidar_mount");
     erase(*physics, "camera_mount");
   }
-  for (const char* device : {"imu", "lidar", "depth"}) {
-    set(scenario, std::string(device) + ".noise_free=true");
+  ConfigNode* devices = find(scenario, "devices");
+  if (!devices) return;
+  for (ConfigNode::Entry& entry : devices->entries) {
+    const std::string type = scalar_at(entry.value, {"type"});
+    if (type == "mid360") keep_only(entry.value, kOfLidar);
+    if (type == "d430") keep_only(entry.value, kOfCamera);
+    if (type == "spinning") keep_only(entry.value, kOfSpinning);
   }
-  clean_devices(scenario);
+}
+
+bool clean_sensors(ConfigNode& scenario) {
+  sell_sensors(scenario);
+  std::vector<std::string> noisy{"imu", "lidar", "depth"};
+  if (const ConfigNode* devices = scenario.find("devices")) {
+    for (const ConfigNode::Entry& entry : devices->entries) {
+      if (scalar_at(entry.value, {"type"}) != "survey") noisy.push_back("devices." + entry.key);
+    }
+  }
+  for (const std::string& device : noisy) set(scenario, device + ".noise_free=true");
   return true;
 }
 
@@ -166,6 +169,13 @@ bool replace_by_truth(BlamedModule module, ConfigNode& scenario) {
       return perfect_tracking(scenario);
   }
   return false;
+}
+
+bool sensors_are_as_sold(const ConfigNode& scenario) {
+  ConfigNode sold = scenario;
+  sell_sensors(sold);
+  return make_scenario("sold", std::move(sold)).resolved_yaml() ==
+         make_scenario("sold", scenario).resolved_yaml();
 }
 
 std::vector<Experiment> plan_experiments(const std::string& name, const ConfigNode& scenario,

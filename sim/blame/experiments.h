@@ -37,6 +37,11 @@ struct Experiment {
 /// @return false if truth stands there already, or the module does nothing in this mission
 bool replace_by_truth(BlamedModule module, ConfigNode& scenario);
 
+/// Whether the sensors of a failed run are no worse than such devices are: default noise, no fault,
+/// no error of mounting.
+/// @param scenario a run's resolved.yaml. @throws ConfigError if it is no scenario.
+[[nodiscard]] bool sensors_are_as_sold(const ConfigNode& scenario);
+
 /// What a blame has to fly.
 /// @param scenario a failed run's resolved.yaml
 /// @param timed_out how it failed: whether more time would have helped is asked as well

@@ -31,6 +31,9 @@ std::string text_of(const Verdict& verdict) {
         text += (i == 0 ? "; the failure runs through " : " and ");
         text += name_of(verdict.through[i]);
       }
+      if (verdict.exact_sensors_help) {
+        text += "; with exact sensors, too, but these were no worse than such devices are";
+      }
       return text;
     }
     case Verdict::Kind::kSeveral:
@@ -57,7 +60,7 @@ ordered_json json_of(const FlightEnd& flight) {
 
 }  // namespace
 
-Verdict judge(const std::vector<FlightEnd>& flights) {
+Verdict judge(const std::vector<FlightEnd>& flights, bool sensors_as_sold) {
   Verdict verdict;
   for (std::size_t i = 0; i < kBlamedModules.size(); ++i) {
     if (!succeeds(flights, kBlamedModules[i])) continue;
@@ -67,6 +70,11 @@ Verdict judge(const std::vector<FlightEnd>& flights) {
     } else {
       verdict.module = module;
     }
+  }
+  if (sensors_as_sold && verdict.module == BlamedModule::kSensors && !verdict.through.empty()) {
+    verdict.module = verdict.through.front();
+    verdict.through.erase(verdict.through.begin());
+    verdict.exact_sensors_help = true;
   }
   if (succeeds(flights, "as_flown")) {
     verdict = {};

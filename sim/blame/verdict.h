@@ -33,6 +33,7 @@ struct Verdict {
   Kind kind = Kind::kPlanning;
   std::optional<BlamedModule> module;  ///< the first, along the flow of data, that ends it
   std::vector<BlamedModule> through;   ///< further ones that end it: the failure runs through them
+  bool exact_sensors_help = false;     ///< too, though they were as sold
   std::string text;                    ///< one sentence
 };
 inline constexpr std::array<std::string_view, 5> kVerdictKinds{"module", "several", "time",
@@ -42,8 +43,10 @@ inline constexpr std::array<std::string_view, 5> kVerdictKinds{"module", "severa
 ///
 /// Where truth in several single places ends the failure, it is laid to the first along the flow of
 /// data: bad depth frames spoil the maps, so that clean frames and true maps both help, and the
-/// frames are at fault. More time counts only where no truth helps in the given time.
-[[nodiscard]] Verdict judge(const std::vector<FlightEnd>& flights);
+/// frames are at fault. Exact sensors help many a module that does not cope with real ones: sensors
+/// that are no worse than such devices are (sensors_are_as_sold) are at fault only where nothing
+/// else helps. More time counts only where no truth helps in the given time.
+[[nodiscard]] Verdict judge(const std::vector<FlightEnd>& flights, bool sensors_as_sold);
 
 /// What a blame knows.
 struct Blame {

@@ -51,7 +51,8 @@ void CompanionLink::hand_on(const Report& what) {
 }
 
 double CompanionLink::throttle_of(double thrust_n) const {
-  return std::clamp(thrust_n / (kRotors * motor_.full_thrust(config_.throttle_voltage_v)), 0.0, 1.0);
+  return std::clamp(thrust_n / (kRotors * motor_.full_thrust(config_.throttle_voltage_v)), 0.0,
+                    1.0);
 }
 
 double CompanionLink::thrust_of(double throttle) const {

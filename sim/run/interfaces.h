@@ -67,9 +67,11 @@ struct InterfaceConfig {
   void fields(auto& f) {
     f("command", command,
       "how the companion says how much thrust it wants: newtons; or throttle, as a share of full "
-      "thrust, which it takes for that at throttle_voltage_v, whatever the battery has left (paper)");
+      "thrust, which it takes for that at throttle_voltage_v, whatever the battery has left "
+      "(paper)");
     f("throttle_voltage_v", throttle_voltage_v,
-      "of the battery that the companion's throttle for hovering was found on. A fuller one lifts the "
+      "of the battery that the companion's throttle for hovering was found on. A fuller one lifts "
+      "the "
       "vehicle by what its position gain takes for the rest: 0.1 m at either end of a flight");
     f("dshot", dshot, "between autopilot and speed controllers");
     f("uart", uart, "between autopilot and companion computer");

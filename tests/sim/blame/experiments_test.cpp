@@ -49,6 +49,27 @@ void expect_choices(const ScenarioConfig& config) {
   EXPECT_EQ(config.devices.at("side").type, "spinning");
 }
 
+TEST(Experiments, SensorsAreAsSoldUntilOneIsWorse) {
+  const auto as_sold = [](const std::string& yaml) {
+    const std::string run = make_scenario("run", parse_yaml(yaml, "run")).resolved_yaml();
+    return sensors_are_as_sold(parse_yaml(run, "run"));
+  };
+  const std::string start = "world: {kind: gaps}\n";
+  EXPECT_TRUE(as_sold(start));
+  // What a scenario chooses, and what is no sensor.
+  EXPECT_TRUE(as_sold(start +
+                      "lidar: {rate_hz: 20}\ndepth: {width_px: 424}\nphysics: {wind: {mean_mps: "
+                      "[5, 0, 0]}}\nfaults: [{device: motor, kind: weak, from_s: 5}]\n"));
+  for (const char* worse :
+       {"imu: {clock_offset_s: 0.02}", "lidar: {echo: {false_alarm_probability: 0.01}}",
+        "depth: {disparity_sigma_px: 0.5}", "physics: {lidar_mount: {rotation_rad: [0.1, 0, 0]}}",
+        "faults: [{device: lidar, kind: silent, from_s: 5}]",
+        "devices: {side: {type: spinning, range_sigma_m: 0.3}}"}) {
+    EXPECT_FALSE(as_sold(start + worse + "\n")) << worse;
+  }
+  EXPECT_FALSE(as_sold(spoiled()));
+}
+
 TEST(Experiments, SensorsWithoutNoiseHaveNoFaultAndSitWhereTheyShould) {
   const ScenarioConfig config = replaced(BlamedModule::kSensors, spoiled());
   expect_choices(config);

@@ -12,7 +12,8 @@ FlightEnd flight(const std::string& name, const std::string& outcome) {
 }
 
 /// Flights of all modules, of which those named succeed.
-Verdict judge_where(const std::vector<std::string>& succeed, bool with_time = false) {
+Verdict judge_where(const std::vector<std::string>& succeed, bool with_time = false,
+                    bool sensors_as_sold = false) {
   std::vector<std::string> names{"sensors", "odometry", "maps", "tracking", "all"};
   if (with_time) names.emplace_back("time");
   std::vector<FlightEnd> flights;
@@ -20,7 +21,7 @@ Verdict judge_where(const std::vector<std::string>& succeed, bool with_time = fa
     const bool good = std::find(succeed.begin(), succeed.end(), name) != succeed.end();
     flights.push_back(flight(name, good ? "succeeded" : "collided"));
   }
-  return judge(flights);
+  return judge(flights, sensors_as_sold);
 }
 
 TEST(Verdict, IsTheModuleWhoseTruthEndsTheFailure) {
@@ -41,6 +42,16 @@ TEST(Verdict, IsTheFirstAlongTheFlowOfDataOfSeveral) {
   EXPECT_NE(verdict.text.find("runs through maps"), std::string::npos);
 }
 
+// Thirty points a scan do for exact ranges and not for real ones: that is no fault of the LiDAR.
+TEST(Verdict, BlamesSensorsAsSoldOnlyWhereNothingElseHelps) {
+  const Verdict verdict = judge_where({"sensors", "odometry", "all"}, false, true);
+  EXPECT_EQ(verdict.module, BlamedModule::kOdometry);
+  EXPECT_TRUE(verdict.through.empty());
+  EXPECT_NE(verdict.text.find("no worse than such devices"), std::string::npos);
+  EXPECT_EQ(judge_where({"sensors", "all"}, false, true).module, BlamedModule::kSensors);
+  EXPECT_EQ(judge_where({"maps", "all"}, false, true).module, BlamedModule::kMaps);
+}
+
 TEST(Verdict, TellsWhatNoSingleTruthEnds) {
   EXPECT_EQ(judge_where({"all"}).kind, Verdict::Kind::kSeveral);
   EXPECT_EQ(judge_where({}).kind, Verdict::Kind::kPlanning);
@@ -52,7 +63,7 @@ TEST(Verdict, TellsWhatNoSingleTruthEnds) {
 
 TEST(Verdict, BlamesNobodyForWhatThisBuildDoesNotDo) {
   std::vector<FlightEnd> flights{flight("as_flown", "succeeded"), flight("maps", "succeeded")};
-  const Verdict verdict = judge(flights);
+  const Verdict verdict = judge(flights, false);
   EXPECT_EQ(verdict.kind, Verdict::Kind::kNotReproduced);
   EXPECT_FALSE(verdict.module.has_value());
 }
@@ -65,7 +76,7 @@ TEST(Verdict, StandsInJsonAndTable) {
               {flight("sensors", "stuck"), flight("maps", "succeeded")},
               {}};
   blame.failed.reason = "no\npath";
-  blame.verdict = judge(blame.flights);
+  blame.verdict = judge(blame.flights, false);
   const nlohmann::ordered_json json = blame_json(blame);
   EXPECT_EQ(json["seed"], 7);
   EXPECT_EQ(json["failed"]["outcome"], "stuck");

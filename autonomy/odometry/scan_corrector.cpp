@@ -14,7 +14,7 @@ namespace {
 constexpr Stamp kShakenFor = kNanosecondsPerSecond;
 /// A surfel's own error is the same for scan after scan and does not average out with their noise:
 /// trunks and rough ground are no planes, whatever the sensor. So much more than that noise it
-/// leaves in the map, by the NEES of twenty flights along waypoints (scenarios/RESULTS.md).
+/// leaves in the map, by the NEES of eighteen flights along waypoints (scenarios/RESULTS.md).
 constexpr double kSharedError = 150;
 
 std::vector<float> fractions_of(const LidarScan& scan, const std::vector<ScanPoint>& points) {

@@ -72,7 +72,7 @@ struct InterfaceConfig {
     f("throttle_voltage_v", throttle_voltage_v,
       "of the battery that the companion's throttle for hovering was found on. A fuller one lifts "
       "the "
-      "vehicle by what its position gain takes for the rest: 0.1 m at either end of a flight");
+      "vehicle by what its position gain leaves: 0.1 m at either end of a flight");
     f("dshot", dshot, "between autopilot and speed controllers");
     f("uart", uart, "between autopilot and companion computer");
     f.check(throttle_voltage_v > 1 && throttle_voltage_v < 100, "1 < throttle_voltage_v < 100");

@@ -29,7 +29,8 @@ add_library(arex_options INTERFACE)
 # same on all of them. EIGEN_MAX_ALIGN_BYTES=16 keeps the layout of Eigen's fixed-size types that of
 # Debian's PCL. Heap blocks differ still: with AVX, Eigen's aligned_malloc pads them to 32 bytes,
 # PCL's does not. No dynamic Eigen matrix and no cloud may be allocated on one side and freed on
-# the other.
+# the other. EIGEN_FAST_MATH=0: else Eigen takes the root of floats by rsqrtps, whose digits are the
+# CPU vendor's.
 target_compile_options(arex_options INTERFACE
   -march=x86-64-v3 -ffp-contract=off -fpch-preprocess
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion
@@ -45,7 +46,7 @@ if(AREX_SANITIZE)
   target_link_options(arex_options INTERFACE -fsanitize=${AREX_SANITIZE})
 endif()
 target_compile_definitions(arex_options INTERFACE
-  EIGEN_MAX_ALIGN_BYTES=16
+  EIGEN_MAX_ALIGN_BYTES=16 EIGEN_FAST_MATH=0
   $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 target_link_libraries(arex_options INTERFACE Eigen3::Eigen Threads::Threads)
 

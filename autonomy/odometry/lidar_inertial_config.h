@@ -9,7 +9,7 @@ namespace arex {
 struct LidarNoiseConfig {
   double range_std_m = 0.0034;
   double range_std_per_m = 0.00073;
-  double angle_std_rad = 1.745e-3;
+  double angle_std_rad = 0.9e-3;
   double blind_m = 0.5;
   double max_range_m = 60.0;
 
@@ -25,7 +25,8 @@ struct LidarNoiseConfig {
   void fields(auto& f) {
     f("range_std_m", range_std_m, "range noise at zero range (measured unit)");
     f("range_std_per_m", range_std_per_m, "growth of the range noise per metre (measured unit)");
-    f("angle_std_rad", angle_std_rad, "angle noise, 0.10 deg (datasheet: below 0.15)");
+    f("angle_std_rad", angle_std_rad,
+      "angle noise; half of the device's 0.10 deg, so that far surfaces tell more of turns");
     f("blind_m", blind_m, "nearer returns are dropped (FAST-LIO)");
     f("max_range_m", max_range_m, "further returns are dropped");
     f.check(range_std_m > 0 && angle_std_rad > 0, "range_std_m > 0, angle_std_rad > 0");
@@ -71,6 +72,7 @@ struct RegistrationConfig {
   double gate_sigma = 4.0;
   double robust_sigma = 2.0;
   double variance_inflation = 4.0;
+  double surface_std_m = 0.02;
 
   void fields(auto& f) {
     f("scan_voxel_m", scan_voxel_m, "one point per such cell of the scan is matched");
@@ -81,12 +83,16 @@ struct RegistrationConfig {
     f("gate_sigma", gate_sigma, "residuals beyond this many sigma of their innovation are refused");
     f("robust_sigma", robust_sigma, "scale of the Cauchy weight, in sigma");
     f("variance_inflation", variance_inflation,
-      "on the residuals' variance: neighbours share their surfel's error");
+      "on the residuals' variance: what surfels side by side have in common");
+    f("surface_std_m", surface_std_m,
+      "1 sigma by which a surfel, a plane, departs from its surface where its points are met "
+      "again");
     f.check(scan_voxel_m >= 0.005 && scan_voxel_m <= 10, "0.005 <= scan_voxel_m <= 10");
     f.check(max_points >= 1 && max_points <= 1000000, "1 <= max_points <= 1000000");
     f.check(max_iterations >= 1 && max_iterations <= 1000, "1 <= max_iterations <= 1000");
     f.check(gate_sigma > 0 && robust_sigma > 0 && variance_inflation > 0,
             "gate_sigma, robust_sigma, variance_inflation > 0");
+    f.check(surface_std_m >= 0, "surface_std_m >= 0");
   }
 };
 

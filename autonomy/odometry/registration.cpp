@@ -1,5 +1,6 @@
 #include "odometry/registration.h"
 
+#include <tsl/robin_map.h>
 #include <tsl/robin_set.h>
 
 #include <Eigen/Cholesky>
@@ -17,6 +18,7 @@ namespace {
 
 constexpr double kLeastInformation = 1e-9;  // keeps the algebra regular
 constexpr double kLeastFeigned = 1e-3;      // likewise: 30 m, 30 rad
+constexpr double kFeignedMargin = 1.2;      // what the normals' errors add scatters by a fifth
 
 using PoseVector = Eigen::Matrix<double, 6, 1>;
 
@@ -31,45 +33,89 @@ struct Linearisation {
   std::vector<int> born;  ///< of the matched surfels
 };
 
+/// A point that has a surfel and passed the gate.
+struct Correspondence {
+  Vec3 p_L;
+  SurfelMatch surfel;
+  PlaneResidual residual;
+};
+
+/// In the order of the points.
+std::vector<Correspondence> correspondences(const std::vector<ScanPoint>& points,
+                                            const SurfelMap& map, const LidarInertialConfig& config,
+                                            const NavigationState& x,
+                                            const PoseInformation::Matrix& P_pose) {
+  const double gate2 = config.registration.gate_sigma * config.registration.gate_sigma;
+  const Pose X_OL = x.X_OB() * x.X_BL;
+  constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
+  std::vector<Correspondence> found;
+  found.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
+    const Vec3 p_L = points[i].p_L.cast<double>();
+    const auto surfel = map.find(X_OL * p_L);
+    if (!surfel) continue;
+    const PlaneResidual residual = plane_residual(x, points[i], *surfel, config.lidar);
+    const double pose_variance = residual.h.dot(P_pose * residual.h);
+    if (residual.r * residual.r > gate2 * (residual.variance_m2 + pose_variance)) continue;
+    found.push_back({p_L, *surfel, residual});
+  }
+  return found;
+}
+
+/// How many of the scan's points share its surfel, for each.
+std::vector<int> sharers(const std::vector<Correspondence>& found) {
+  tsl::robin_map<std::uint64_t, int, CellKeyHash> counts;
+  counts.reserve(found.size());
+  const auto key = [](const SurfelMatch& surfel) {
+    return static_cast<std::uint64_t>(surfel.level) << 32 | surfel.cell;
+  };
+  for (const Correspondence& c : found) ++counts[key(c.surfel)];
+  std::vector<int> shared;
+  shared.reserve(found.size());
+  for (const Correspondence& c : found) shared.push_back(counts.at(key(c.surfel)));
+  return shared;
+}
+
 /// Sums the residuals of all points at the iterate `x`, in the order of the points.
+///
+/// What is wrong with a surfel is the same for the n points that share it, however many they are:
+/// the mean of their residuals has the variance v / n + s, v of each alone and s in common, and
+/// each counts for an n-th of its inverse, 1 / (v + n s). Else trunks nearby, which hundreds of
+/// points meet and which are no planes, outvote what stands farther away, and turn the vehicle a
+/// little at every passing.
 Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& map,
                         const LidarInertialConfig& config, const NavigationState& x,
                         const PoseInformation::Matrix& P_pose) {
   const RegistrationConfig& rc = config.registration;
-  const double gate2 = rc.gate_sigma * rc.gate_sigma;
   const double robust2 = rc.robust_sigma * rc.robust_sigma;
+  const double surface_variance = rc.surface_std_m * rc.surface_std_m;
   const Pose X_OL = x.X_OB() * x.X_BL;
   const Mat3 R_BO = x.R_OB.transpose();
-  constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
+  const std::vector<Correspondence> found = correspondences(points, map, config, x, P_pose);
+  const std::vector<int> shared = sharers(found);
   Linearisation sum;
-  sum.born.reserve(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ScanPoint& point = points[i];
-    if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
-    const Vec3 p_O = X_OL * point.p_L.cast<double>();
-    const auto match = map.find(p_O);
-    if (!match) continue;
-    const PlaneResidual residual = plane_residual(x, point, *match, config.lidar);
-    const double r2 = residual.r * residual.r;
-    const double pose_variance = residual.h.dot(P_pose * residual.h);
-    if (r2 > gate2 * (residual.variance_m2 + pose_variance)) continue;
-    ++sum.matched;
-    sum.born.push_back(match->born);
-    const double sigma2 = r2 / residual.variance_m2;
+  sum.matched = static_cast<int>(found.size());
+  sum.born.reserve(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto& [p_L, surfel, residual] = found[i];
+    sum.born.push_back(surfel.born);
+    const double sigma2 = residual.r * residual.r / residual.variance_m2;
     sum.sum_squared_sigma += sigma2;
+    const double in_common = (shared[i] - 1) * (surfel.variance_m2 + surface_variance);
     const double weight =
-        1 / ((1 + sigma2 / robust2) * rc.variance_inflation * residual.variance_m2);
+        1 / ((1 + sigma2 / robust2) * rc.variance_inflation * (residual.variance_m2 + in_common));
     const PoseVector h = residual.h.head<6>();
     const PoseVector weighted = weight * h;
     sum.A.noalias() += weighted * h.transpose();
     sum.b += residual.r * weighted;
     // h = G n and r = n . (p_O - mean) share the normal, and with it its error.
     Eigen::Matrix<double, 6, 3> G;
-    G.topRows<3>() = so3::hat(x.X_BL * point.p_L.cast<double>()) * R_BO;
+    G.topRows<3>() = so3::hat(x.X_BL * p_L) * R_BO;
     G.bottomRows<3>().setIdentity();
-    const Eigen::Matrix<double, 6, 3> GS = G * (weight * match->normal_covariance);
+    const Eigen::Matrix<double, 6, 3> GS = G * (weight * surfel.normal_covariance);
     sum.feigned.noalias() += GS * G.transpose();
-    sum.pull.noalias() += GS * (p_O - match->mean);
+    sum.pull.noalias() += GS * (X_OL * p_L - surfel.mean);
   }
   return sum;
 }
@@ -85,7 +131,8 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
 /// Source: Fuller, Measurement Error Models, 1987, 2.2: least squares corrected for the attenuation
 /// that errors in the regressors cause.
 void take_off_feigned(Linearisation& sum) {
-  const PoseCovariance N = sum.feigned + kLeastFeigned * PoseCovariance::Identity();
+  const PoseCovariance N =
+      kFeignedMargin * sum.feigned + kLeastFeigned * PoseCovariance::Identity();
   const PoseCovariance L = N.llt().matrixL();
   const PoseCovariance L_inverse = L.inverse();
   // A in units of N: the eigenvalue 1 is nothing but error.

@@ -243,9 +243,9 @@ std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
     const Vec3 d = p_G - mean;
     const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
     if (!best || variance < best->variance_m2) {
-      best =
-          SurfelMatch{to_vec3(surfel.normal), mean,       variance, to_symmetric(surfel.regression),
-                      static_cast<int>(l),    surfel.born};
+      best = SurfelMatch{
+          to_vec3(surfel.normal), mean,        variance, to_symmetric(surfel.regression),
+          static_cast<int>(l),    surfel.born, index};
     }
   }
   if (best) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,7 @@ struct SurfelMatch {
   Mat3 normal_covariance = Mat3::Zero();  ///< of the normal's error, in O
   int level = 0;                          ///< 0: the finest
   int born = 0;                           ///< the insertion that began its cell
+  std::uint32_t cell = 0;                 ///< its number in its level
 };
 
 /// Hashed cells of several resolutions. Each keeps the weighted moments of the points that fell

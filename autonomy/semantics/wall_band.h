@@ -40,8 +40,9 @@ class BandHeights {
     const auto floor = static_cast<std::size_t>(clearances_.floor_of[point]);
     return floor < low_.size() ? low_[floor] : kLow;
   }
+  /// Below a duct, or pipes side by side, which nothing hangs from, it is as high as it must be.
   [[nodiscard]] double high(std::uint32_t point) const {
-    return high_of(static_cast<double>(clearances_.room[point]));
+    return std::max(high_of(static_cast<double>(clearances_.room[point])), low(point) + kLeastBand);
   }
   [[nodiscard]] bool has(std::uint32_t point) const {
     const auto above = static_cast<double>(clearances_.above_floor[point]);

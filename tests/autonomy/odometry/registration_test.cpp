@@ -191,10 +191,11 @@ TEST(RegisterScan, FlatGroundSaysNothingAlongItHoweverItsNormalsErr) {
     ASSERT_TRUE(report.accepted);
     EXPECT_GT(report.position_std_m[1], config.health.lost_position_std_m) << seed;
     EXPECT_GT(report.rotation_std_rad[0], config.health.lost_rotation_std_rad) << seed;
-    EXPECT_LT(report.position_std_m[2], 0.005);
-    // The filter believes along the ground what it believed before, to a few percent.
-    EXPECT_GT(filter.covariance()(kPosition, kPosition), 0.9e-2);
-    EXPECT_GT(filter.covariance()(kPosition + 1, kPosition + 1), 0.9e-2);
+    EXPECT_LT(report.position_std_m[2], 0.01);
+    // The filter believes along the ground what it believed before, to a fifth of the variance:
+    // what the normals feign scatters so, the points of one surfel sharing its normal.
+    EXPECT_GT(filter.covariance()(kPosition, kPosition), 0.8e-2);
+    EXPECT_GT(filter.covariance()(kPosition + 1, kPosition + 1), 0.8e-2);
   }
 }
 
@@ -249,6 +250,29 @@ TEST(RegisterScan, OutliersHardlyMoveIt) {
   const RegistrationReport report = register_scan(points, corner.map, config, 0, filter);
   EXPECT_TRUE(report.accepted);
   EXPECT_LT(filter.state().p_OB.norm(), 0.02);
+}
+
+// Half of what the scan sees of one wall is a patch of it that the map holds 1.5 cm askew, met by a
+// thousand points: it is one witness, not a thousand.
+TEST(RegisterScan, HowManyPointsMeetASurfelDoesNotMakeItSurer) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  RandomStream random(6, "patch");
+  std::vector<ScanPoint> points = corner.points;
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 p(random.uniform(0, 0.2), random.uniform(0, 0.2), -2.085 + 0.005 * random.normal());
+    ScanPoint point;
+    point.p_L = p.cast<float>();
+    point.range_m = static_cast<float>(p.norm());
+    points.push_back(point);
+  }
+  const auto pulled = [&](const std::vector<ScanPoint>& scan) {
+    ErrorStateFilter filter(config.imu);
+    filter.reset(NavigationState{}, pose_doubt());
+    EXPECT_TRUE(register_scan(scan, corner.map, config, 0, filter).accepted);
+    return filter.state().p_OB.z();
+  };
+  EXPECT_LT(std::abs(pulled(points) - pulled(corner.points)), 5e-4);
 }
 
 // A prior that knows nothing leaves the scan's own covariance, and the shaking beside it.

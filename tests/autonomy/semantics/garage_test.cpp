@@ -196,6 +196,26 @@ TEST(GarageMap, TakesNoPillarsSideForAWallNorADuctForACeiling) {
   }
 }
 
+TEST(GarageMap, FindsWallsAndPillarsBelowALowCeiling) {
+  AnalyticGarage garage(0, Vec3::Zero(), 8);
+  garage.build();
+  // Ducts side by side above one row, wide as a room: 2.55 m above the floor, where beams below
+  // ceilings are looked for.
+  garage.face({5, 4.5, 2.55}, {20, 0, 0}, {0, 3.2, 0});
+  partition(garage, {7.5, 6}, {15, 6});
+  const SemanticMap map = build_semantic_map(garage.points, {}, {});
+  EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size());
+  for (const Vec2& pillar : garage.pillars) {
+    const SemanticObject* found = nearest(map, SemanticClass::kPillar, pillar);
+    ASSERT_NE(found, nullptr);
+    EXPECT_LT((found->position.head<2>() - pillar).norm(), 0.05) << pillar.transpose();
+  }
+  const SemanticObject* wall = nearest(map, SemanticClass::kWall, {11.25, 6});
+  ASSERT_NE(wall, nullptr);
+  EXPECT_LT((wall->position.head<2>() - Vec2(11.25, 6)).norm(), 0.3);
+  EXPECT_GT(wall->size.x(), 6.5);
+}
+
 TEST(GarageMap, TakesNoRowOfCabinetsForACar) {
   AnalyticGarage garage(0.4, {3, 2, 0}, 6);
   garage.build();

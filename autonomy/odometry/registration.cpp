@@ -177,6 +177,20 @@ PoseInformation with_shaking(const PoseInformation& information, double std_rad)
   return shaken;
 }
 
+/// The pose that a scan and the prior make most likely, where the prior's attitude is that of an
+/// IMU which is shaken against the LiDAR: its variance counts for the prior, not for the scan.
+/// The extrinsics are taken as they stand.
+/// @param x where the scan was linearised
+Pose without_shaking(const Linearisation& sum, const NavigationState& x,
+                     const NavigationState& prior, PoseCovariance P, double shaken_rad) {
+  P.diagonal().head<3>().array() += shaken_rad * shaken_rad;
+  const PoseVector from_x = local(x, prior).head<6>();
+  const PoseCovariance I_AP = PoseCovariance::Identity() + sum.A * P;
+  ErrorVector d = ErrorVector::Zero();
+  d.head<6>() = from_x - P * I_AP.partialPivLu().solve(PoseVector(sum.b + sum.A * from_x));
+  return retract(x, d).X_OB();
+}
+
 /// What is left of a block's information once the other block is unknown too, as deviations. Of
 /// that one a radian or a metre is known, or in what a scan leaves open the least coupling would
 /// hide all.
@@ -239,7 +253,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
   RegistrationReport report;
   report.points = static_cast<int>(points.size());
   const PoseInformation::Matrix P_pose = filter.pose_covariance();
-  NavigationState x = filter.state();
+  NavigationState x = filter.state(), linearised = x;
   Linearisation at_x;
   PoseInformation seen;
   for (int i = 0; i < config.registration.max_iterations; ++i) {
@@ -249,6 +263,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
     take_off_feigned(at_x);
     seen = with_shaking(with_extrinsics(at_x, x), shaken_rad);
     const NavigationState next = filter.iterate(x, seen);
+    linearised = x;
     const ErrorVector step = local(x, next);
     x = next;
     if (step.segment<3>(kRotation).norm() < config.registration.converged_rad &&
@@ -272,6 +287,7 @@ RegistrationReport register_scan(const std::vector<ScanPoint>& points, const Sur
     const PoseVector d = local(filter.state(), x).head<6>();
     const PoseCovariance P = P_pose.topLeftCorner<6, 6>();
     report.innovation = std::sqrt(d.dot(P.ldlt().solve(d)) / 6);
+    report.X_OB = without_shaking(at_x, linearised, filter.state(), P, shaken_rad);
     filter.finish(x, seen);
     // The gain M gives this scan's noise the covariance M A' M, M being the posterior covariance.
     const PoseCovariance posterior = filter.pose_covariance().topLeftCorner<6, 6>();

@@ -28,6 +28,9 @@ struct RegistrationReport {
   /// brought. Together the filter's; nil if it was not corrected.
   PoseCovariance covariance = PoseCovariance::Zero();
   PoseCovariance carried = PoseCovariance::Zero();
+  /// Where the LiDAR says that the vehicle is, X_OB: the filter's state but for the angle by which
+  /// the IMU is shaken against the LiDAR.
+  Pose X_OB;
   std::vector<int> born;  ///< of the surfels of the matched points, at the last iterate
 };
 

@@ -79,7 +79,7 @@ ScanUpdate ScanCorrector::correct(const ScanJob& job) {
     std::vector<float> fractions;
     if (update.registration.accepted && status_ != OdometryStatus::kLost &&
         doubtful_in_a_row_ == 0) {
-      points_O = to_O(points);
+      points_O = to_O(points, update.registration.X_OB);
       fractions = fractions_of(*job.scan, points);
       map_met_ = drift_.met(update.registration.born, filter_.state().p_OB);
       if (confirmations_left_ == 0) {
@@ -156,7 +156,7 @@ bool ScanCorrector::start(const StaticStart& standing, Stamp stamp) {
     still.end = scan->end;
     still.X_OB = filter_.state().X_OB();
     points = undistort(*scan, {still}, still.X_OB, X_BL_, config_.lidar, body_radius_m_);
-    insert(points, to_O(points));
+    insert(points, to_O(points, filter_.state().X_OB()));
     drift_.add_first();
   }
   // A filter that no scan can correct runs away within seconds.
@@ -446,8 +446,9 @@ bool ScanCorrector::recover(const std::vector<ScanPoint>& points, RegistrationRe
   return true;
 }
 
-std::vector<Vec3f> ScanCorrector::to_O(const std::vector<ScanPoint>& points) const {
-  const Pose X_OL = filter_.state().X_OB() * filter_.state().X_BL;
+std::vector<Vec3f> ScanCorrector::to_O(const std::vector<ScanPoint>& points,
+                                       const Pose& X_OB) const {
+  const Pose X_OL = X_OB * filter_.state().X_BL;
   std::vector<Vec3f> points_O;
   points_O.reserve(points.size());
   for (const ScanPoint& point : points) {

@@ -98,7 +98,8 @@ class ScanCorrector {
   void update_status(const ScanUpdate& update);
   bool recover(const std::vector<ScanPoint>& points, RegistrationReport& report);
   void insert(const std::vector<ScanPoint>& points, const std::vector<Vec3f>& points_O);
-  [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points) const;
+  [[nodiscard]] std::vector<Vec3f> to_O(const std::vector<ScanPoint>& points,
+                                        const Pose& X_OB) const;
 
   LidarInertialConfig config_;
   ImuNoiseConfig configured_imu_;  ///< before it is graded by what the start measures

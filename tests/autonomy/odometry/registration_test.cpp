@@ -294,6 +294,41 @@ TEST(RegisterScan, WhatShakesTheImuIsNotKnownBetterForManyPoints) {
   }
 }
 
+// The IMU is shaken by 0.5 mrad against the LiDAR: the scan tells where the LiDAR is, and moves the
+// filter, which follows the IMU, hardly.
+TEST(RegisterScan, PlacesTheScanWhereTheLidarIs) {
+  const Corner corner(true);
+  const LidarInertialConfig config;
+  constexpr double kShaken = 5e-4;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    RandomStream random(seed, "shaken");
+    const auto registered = [&](const Vec3& off, double shaken_rad, Pose& X_OB) {
+      ErrorStateFilter filter(config.imu);
+      NavigationState x;
+      x.R_OB = so3::Exp(off);
+      ErrorMatrix P = pose_doubt();
+      P.diagonal().head<3>().setConstant(1e-8);
+      P.diagonal().segment<6>(kExtrinsicRotation).setZero();
+      filter.reset(x, P);
+      const RegistrationReport report =
+          register_scan(corner.points, corner.map, config, shaken_rad, filter);
+      EXPECT_TRUE(report.accepted);
+      X_OB = report.X_OB;
+      return filter.state().X_OB();
+    };
+    const Vec3 off = kShaken * random.normal3().normalized();
+    Pose by_lidar;
+    const Pose by_filter = registered(off, kShaken, by_lidar);
+    EXPECT_GT(so3::angle(by_filter.R), 0.8 * kShaken) << seed;
+    EXPECT_LT(so3::angle(by_lidar.R), 0.4 * kShaken) << seed;
+    EXPECT_LT(by_lidar.p.norm(), 0.002) << seed;
+    // With nothing shaken they are one, to what the iterations leave.
+    const Pose unshaken = registered(off, 0, by_lidar);
+    EXPECT_LT(so3::angle(unshaken.R.transpose() * by_lidar.R), 1e-6) << seed;
+    EXPECT_LT((unshaken.p - by_lidar.p).norm(), 1e-5) << seed;
+  }
+}
+
 TEST(RegisterScan, RefusesWhatDoesNotFit) {
   const Corner corner(true);
   const LidarInertialConfig config;

@@ -38,18 +38,24 @@ struct Correspondence {
   Vec3 p_L;
   SurfelMatch surfel;
   PlaneResidual residual;
+  std::size_t met = 0;  ///< which of the surfels that the scan meets
+};
+struct Correspondences {
+  std::vector<Correspondence> all;  ///< in the order of the points
+  std::vector<int> sharers;         ///< of each surfel that the scan meets
 };
 
-/// In the order of the points.
-std::vector<Correspondence> correspondences(const std::vector<ScanPoint>& points,
-                                            const SurfelMap& map, const LidarInertialConfig& config,
-                                            const NavigationState& x,
-                                            const PoseInformation::Matrix& P_pose) {
+Correspondences correspondences(const std::vector<ScanPoint>& points, const SurfelMap& map,
+                                const LidarInertialConfig& config, const NavigationState& x,
+                                const PoseInformation::Matrix& P_pose) {
   const double gate2 = config.registration.gate_sigma * config.registration.gate_sigma;
   const Pose X_OL = x.X_OB() * x.X_BL;
   constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
-  std::vector<Correspondence> found;
-  found.reserve(points.size());
+  Correspondences found;
+  found.all.reserve(points.size());
+  found.sharers.reserve(points.size());
+  tsl::robin_map<std::uint64_t, std::size_t, CellKeyHash> met;
+  met.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
     const Vec3 p_L = points[i].p_L.cast<double>();
@@ -58,23 +64,13 @@ std::vector<Correspondence> correspondences(const std::vector<ScanPoint>& points
     const PlaneResidual residual = plane_residual(x, points[i], *surfel, config.lidar);
     const double pose_variance = residual.h.dot(P_pose * residual.h);
     if (residual.r * residual.r > gate2 * (residual.variance_m2 + pose_variance)) continue;
-    found.push_back({p_L, *surfel, residual});
+    const std::uint64_t key = static_cast<std::uint64_t>(surfel->level) << 32 | surfel->cell;
+    const auto [at, first] = met.try_emplace(key, found.sharers.size());
+    if (first) found.sharers.push_back(0);
+    ++found.sharers[at->second];
+    found.all.push_back({p_L, *surfel, residual, at->second});
   }
   return found;
-}
-
-/// How many of the scan's points share its surfel, for each.
-std::vector<int> sharers(const std::vector<Correspondence>& found) {
-  tsl::robin_map<std::uint64_t, int, CellKeyHash> counts;
-  counts.reserve(found.size());
-  const auto key = [](const SurfelMatch& surfel) {
-    return static_cast<std::uint64_t>(surfel.level) << 32 | surfel.cell;
-  };
-  for (const Correspondence& c : found) ++counts[key(c.surfel)];
-  std::vector<int> shared;
-  shared.reserve(found.size());
-  for (const Correspondence& c : found) shared.push_back(counts.at(key(c.surfel)));
-  return shared;
 }
 
 /// Sums the residuals of all points at the iterate `x`, in the order of the points.
@@ -92,17 +88,15 @@ Linearisation linearise(const std::vector<ScanPoint>& points, const SurfelMap& m
   const double surface_variance = rc.surface_std_m * rc.surface_std_m;
   const Pose X_OL = x.X_OB() * x.X_BL;
   const Mat3 R_BO = x.R_OB.transpose();
-  const std::vector<Correspondence> found = correspondences(points, map, config, x, P_pose);
-  const std::vector<int> shared = sharers(found);
+  const Correspondences found = correspondences(points, map, config, x, P_pose);
   Linearisation sum;
-  sum.matched = static_cast<int>(found.size());
-  sum.born.reserve(found.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const auto& [p_L, surfel, residual] = found[i];
+  sum.matched = static_cast<int>(found.all.size());
+  sum.born.reserve(found.all.size());
+  for (const auto& [p_L, surfel, residual, met] : found.all) {
     sum.born.push_back(surfel.born);
     const double sigma2 = residual.r * residual.r / residual.variance_m2;
     sum.sum_squared_sigma += sigma2;
-    const double in_common = (shared[i] - 1) * (surfel.variance_m2 + surface_variance);
+    const double in_common = (found.sharers[met] - 1) * (surfel.variance_m2 + surface_variance);
     const double weight =
         1 / ((1 + sigma2 / robust2) * rc.variance_inflation * (residual.variance_m2 + in_common));
     const PoseVector h = residual.h.head<6>();

@@ -106,6 +106,16 @@ const SemanticObject* nearest(const SemanticMap& map, SemanticClass kind, const 
   return best == found.end() ? nullptr : *best;
 }
 
+/// All of a hall that is not turned, and no others.
+void expect_pillars(const SemanticMap& map, const AnalyticGarage& garage) {
+  EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size());
+  for (const Vec2& pillar : garage.pillars) {
+    const SemanticObject* found = nearest(map, SemanticClass::kPillar, pillar);
+    ASSERT_NE(found, nullptr);
+    EXPECT_LT((found->position.head<2>() - pillar).norm(), 0.05) << pillar.transpose();
+  }
+}
+
 TEST(GarageMap, FindsPillarsCarsWallsAndTheRamp) {
   for (const double yaw : {0.0, 0.4, 1.3}) {
     AnalyticGarage garage(yaw, {12, -7, -8}, 1);
@@ -188,12 +198,7 @@ TEST(GarageMap, TakesNoPillarsSideForAWallNorADuctForACeiling) {
     garage.face({0.3, y - 0.65, 2.55}, {29.4, 0, 0}, {0, 0, 0.3});
   }
   const SemanticMap map = build_semantic_map(garage.points, {}, {});
-  EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size());
-  for (const Vec2& pillar : garage.pillars) {
-    const SemanticObject* found = nearest(map, SemanticClass::kPillar, pillar);
-    ASSERT_NE(found, nullptr);
-    EXPECT_LT((found->position.head<2>() - pillar).norm(), 0.05) << pillar.transpose();
-  }
+  expect_pillars(map, garage);
 }
 
 TEST(GarageMap, FindsWallsAndPillarsBelowALowCeiling) {
@@ -204,12 +209,7 @@ TEST(GarageMap, FindsWallsAndPillarsBelowALowCeiling) {
   garage.face({5, 4.5, 2.55}, {20, 0, 0}, {0, 3.2, 0});
   partition(garage, {7.5, 6}, {15, 6});
   const SemanticMap map = build_semantic_map(garage.points, {}, {});
-  EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size());
-  for (const Vec2& pillar : garage.pillars) {
-    const SemanticObject* found = nearest(map, SemanticClass::kPillar, pillar);
-    ASSERT_NE(found, nullptr);
-    EXPECT_LT((found->position.head<2>() - pillar).norm(), 0.05) << pillar.transpose();
-  }
+  expect_pillars(map, garage);
   const SemanticObject* wall = nearest(map, SemanticClass::kWall, {11.25, 6});
   ASSERT_NE(wall, nullptr);
   EXPECT_LT((wall->position.head<2>() - Vec2(11.25, 6)).norm(), 0.3);

@@ -50,26 +50,25 @@ Correspondences correspondences(const std::vector<ScanPoint>& points, const Surf
                                 const PoseInformation::Matrix& P_pose) {
   const double gate2 = config.registration.gate_sigma * config.registration.gate_sigma;
   const Pose X_OL = x.X_OB() * x.X_BL;
-  constexpr std::size_t kAhead = 8;  // points whose cells are asked for before their turn
+  std::vector<Vec3> points_O;
+  points_O.reserve(points.size());
+  for (const ScanPoint& point : points) points_O.push_back(X_OL * point.p_L.cast<double>());
   Correspondences found;
   found.all.reserve(points.size());
   found.sharers.reserve(points.size());
   tsl::robin_map<std::uint64_t, std::size_t, CellKeyHash> met;
   met.reserve(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i + kAhead < points.size()) map.prefetch(X_OL * points[i + kAhead].p_L.cast<double>());
-    const Vec3 p_L = points[i].p_L.cast<double>();
-    const auto surfel = map.find(X_OL * p_L);
-    if (!surfel) continue;
+  map.find_each(points_O, [&](std::size_t i, const std::optional<SurfelMatch>& surfel) {
+    if (!surfel) return;
     const PlaneResidual residual = plane_residual(x, points[i], *surfel, config.lidar);
     const double pose_variance = residual.h.dot(P_pose * residual.h);
-    if (residual.r * residual.r > gate2 * (residual.variance_m2 + pose_variance)) continue;
+    if (residual.r * residual.r > gate2 * (residual.variance_m2 + pose_variance)) return;
     const std::uint64_t key = static_cast<std::uint64_t>(surfel->level) << 32 | surfel->cell;
     const auto [at, first] = met.try_emplace(key, found.sharers.size());
     if (first) found.sharers.push_back(0);
     ++found.sharers[at->second];
-    found.all.push_back({p_L, *surfel, residual, at->second});
-  }
+    found.all.push_back({points[i].p_L.cast<double>(), *surfel, residual, at->second});
+  });
   return found;
 }
 

@@ -22,12 +22,14 @@ struct Guess {
 };
 
 int score_of(const Pose& X_OL, const std::vector<Vec3>& sample_L, const SurfelMap& map) {
+  std::vector<Vec3> sample_O;
+  sample_O.reserve(sample_L.size());
+  for (const Vec3& p_L : sample_L) sample_O.push_back(X_OL * p_L);
   int score = 0;
-  for (const Vec3& p_L : sample_L) {
-    const Vec3 p_O = X_OL * p_L;
-    const auto match = map.find(p_O);
-    if (match && std::abs(match->normal.dot(p_O - match->mean)) < kScoredDistance) ++score;
-  }
+  map.find_each(sample_O, [&](std::size_t i, const std::optional<SurfelMatch>& match) {
+    if (!match) return;
+    if (std::abs(match->normal.dot(sample_O[i] - match->mean)) < kScoredDistance) ++score;
+  });
   return score;
 }
 

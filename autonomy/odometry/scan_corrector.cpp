@@ -316,15 +316,17 @@ double ScanCorrector::fit_of(const LidarScan& scan, const Vec3& missing_radps) c
     segments.push_back(after);
   }
   const Pose X_OL = X_OB * x.X_BL;
-  double fit = 0;
+  std::vector<Vec3> points_O;
   for (const ScanPoint& point :
        undistort(scan, segments, X_OB, x.X_BL, config_.lidar, body_radius_m_)) {
-    const Vec3 p_O = X_OL * point.p_L.cast<double>();
-    const auto match = map_.find(p_O);
-    if (!match) continue;
-    const double off = match->normal.dot(p_O - match->mean) / kScale;
-    fit += 1 / (1 + off * off);
+    points_O.push_back(X_OL * point.p_L.cast<double>());
   }
+  double fit = 0;
+  map_.find_each(points_O, [&](std::size_t i, const std::optional<SurfelMatch>& match) {
+    if (!match) return;
+    const double off = match->normal.dot(points_O[i] - match->mean) / kScale;
+    fit += 1 / (1 + off * off);
+  });
   return fit;
 }
 

@@ -135,25 +135,34 @@ SurfelMap::Slot& SurfelMap::obtain(Level& level, std::uint64_t key, int insertio
 
 void SurfelMap::insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2,
                        int insertion) {
-  // Level by level and with the slots asked for ahead: the time goes into waiting for memory.
-  constexpr std::size_t kAhead = 16;
+  // Level by level, slots and cells asked for ahead: the time goes into waiting for memory.
+  constexpr std::size_t kSlotsAhead = 16, kCellsAhead = 8;
   std::vector<Vec3> points_G;
   points_G.reserve(points_O.size());
   for (const Vec3f& p_O : points_O) points_G.emplace_back(kR_GO * p_O.cast<double>());
+  const std::size_t n = points_G.size();
   for (Level& level : levels_) {
-    make_slots(level, points_O.size());
-    const std::size_t mask = level.slots.size() - 1;
-    std::array<std::uint64_t, kAhead> keys{};
-    const auto look_ahead = [&](std::size_t i) {
-      keys[i % kAhead] = key_of(points_G[i], level.inverse_edge);
-      __builtin_prefetch(&level.slots[mix_bits(keys[i % kAhead]) & mask]);
-    };
-    for (std::size_t i = 0; i < std::min(kAhead, points_G.size()); ++i) look_ahead(i);
-    for (std::size_t i = 0; i < points_G.size(); ++i) {
+    make_slots(level, n);
+    std::array<std::uint64_t, kSlotsAhead> keys{};
+    const auto add_point = [&](std::size_t i) {
       const float weight = static_cast<float>(kUnitVariance) / variances_m2[i];
       const Vec3 centre = centre_of(points_G[i], level.edge_m, level.inverse_edge);
-      add(level, obtain(level, keys[i % kAhead], insertion), points_G[i] - centre, weight);
-      if (i + kAhead < points_G.size()) look_ahead(i + kAhead);
+      Slot& slot = obtain(level, keys[i % kSlotsAhead], insertion);
+      add(level, slot, points_G[i] - centre, weight);
+    };
+    for (std::size_t i = 0; i < n + kSlotsAhead; ++i) {
+      if (i >= kSlotsAhead) add_point(i - kSlotsAhead);
+      if (i < n) {
+        const std::uint64_t key = key_of(points_G[i], level.inverse_edge);
+        keys[i % kSlotsAhead] = key;
+        __builtin_prefetch(&level.slots[mix_bits(key) & (level.slots.size() - 1)]);
+      }
+      if (i >= kCellsAhead && i - kCellsAhead < n) {
+        const Slot& slot = level.slots[slot_of(level, keys[(i - kCellsAhead) % kSlotsAhead])];
+        if (slot.cell != kNone && slot.saturated == 0) {
+          __builtin_prefetch(&level.cells[slot.cell], 1);
+        }
+      }
     }
   }
 }
@@ -177,16 +186,6 @@ void SurfelMap::add(Level& level, Slot& slot, const Vec3& offset_G, float weight
     cell.refresh_at =
         std::max(cell.count + 1, static_cast<int>(std::ceil(cell.count * config_.refresh_growth)));
   }
-}
-
-void SurfelMap::prefetch(const Vec3& p_O) const {
-  const Vec3 p_G = kR_GO * p_O;
-  for (const Level& level : levels_) {
-    const std::size_t mask = level.slots.size() - 1;
-    __builtin_prefetch(&level.slots[mix_bits(key_of(p_G, level.inverse_edge)) & mask]);
-  }
-  // GCC takes a function of nothing but prefetches for pure and drops the calls that it sees.
-  asm volatile("");
 }
 
 SurfelMap::Fit SurfelMap::fit(int count, double weight, const Vec3& mean, const Mat3& covariance) {
@@ -230,30 +229,60 @@ void SurfelMap::refresh(const Level& level, const Cell& cell, Surfel& surfel) co
       static_cast<float>(f.thickness_m2 * (1 + 1 / static_cast<double>(cell.count)));
 }
 
-std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
-  const Vec3 p_G = kR_GO * p_O;
-  std::optional<SurfelMatch> best;
+SurfelMap::Query SurfelMap::begin(const Vec3& p_O) const {
+  Query query;
+  query.p_G = kR_GO * p_O;
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     const Level& level = levels_[l];
-    const std::uint32_t index = level.slots[slot_of(level, key_of(p_G, level.inverse_edge))].cell;
-    if (index == kNone) continue;
-    const Surfel& surfel = level.surfels[index];
+    query.keys[l] = key_of(query.p_G, level.inverse_edge);
+    __builtin_prefetch(&level.slots[mix_bits(query.keys[l]) & (level.slots.size() - 1)]);
+  }
+  return query;
+}
+
+void SurfelMap::look_up(Query& query) const {
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    const Level& level = levels_[l];
+    query.cells[l] = level.slots[slot_of(level, query.keys[l])].cell;
+    if (query.cells[l] != kNone) __builtin_prefetch(&level.surfels[query.cells[l]]);
+  }
+}
+
+std::optional<SurfelMatch> SurfelMap::answer(const Query& query) const {
+  const Surfel* best = nullptr;
+  std::size_t best_level = 0;
+  Vec3 best_mean;
+  double least = 0;
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    if (query.cells[l] == kNone) continue;
+    const Level& level = levels_[l];
+    const Surfel& surfel = level.surfels[query.cells[l]];
     if (surfel.thickness_m2 < 0) continue;
-    const Vec3 mean = centre_of(p_G, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
-    const Vec3 d = p_G - mean;
+    const Vec3 mean =
+        centre_of(query.p_G, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
+    const Vec3 d = query.p_G - mean;
     const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
-    if (!best || variance < best->variance_m2) {
-      best = SurfelMatch{
-          to_vec3(surfel.normal), mean,        variance, to_symmetric(surfel.regression),
-          static_cast<int>(l),    surfel.born, index};
+    if (best == nullptr || variance < least) {
+      best = &surfel;
+      best_level = l;
+      best_mean = mean;
+      least = variance;
     }
   }
-  if (best) {
-    best->normal = kR_GO.transpose() * best->normal;
-    best->mean = kR_GO.transpose() * best->mean;
-    best->normal_covariance = kR_GO.transpose() * best->normal_covariance * kR_GO;
-  }
-  return best;
+  if (best == nullptr) return std::nullopt;
+  return SurfelMatch{kR_GO.transpose() * to_vec3(best->normal),
+                     kR_GO.transpose() * best_mean,
+                     least,
+                     kR_GO.transpose() * to_symmetric(best->regression) * kR_GO,
+                     static_cast<int>(best_level),
+                     best->born,
+                     query.cells[best_level]};
+}
+
+std::optional<SurfelMatch> SurfelMap::find(const Vec3& p_O) const {
+  Query query = begin(p_O);
+  look_up(query);
+  return answer(query);
 }
 
 bool SurfelMap::occupied(const Vec3& p_O) const {

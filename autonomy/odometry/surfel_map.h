@@ -43,11 +43,27 @@ class SurfelMap {
   void insert(std::span<const Vec3f> points_O, std::span<const float> variances_m2,
               int insertion = 0);
 
-  /// Asks the memory for what find(p_O) will read.
-  void prefetch(const Vec3& p_O) const;
-
   /// The surfel with the least variance at p_O among the cells that hold p_O, if any has one.
   [[nodiscard]] std::optional<SurfelMatch> find(const Vec3& p_O) const;
+
+  /// Calls visit(i, find(points_O[i])) for each point in order. The time of a query goes into
+  /// waiting for memory, so that what it reads is asked for some points ahead.
+  template <typename Visit>
+  void find_each(std::span<const Vec3> points_O, Visit visit) const {
+    constexpr std::size_t kSlotsAhead = 16, kSurfelsAhead = 8;
+    std::array<Query, kSlotsAhead> queries;
+    const std::size_t n = points_O.size();
+    for (std::size_t i = 0; i < n + kSlotsAhead; ++i) {
+      // A query's place is taken again only after it was answered.
+      if (i >= kSlotsAhead) {
+        visit(i - kSlotsAhead, answer(queries[i % kSlotsAhead]));
+      }
+      if (i < n) queries[i % kSlotsAhead] = begin(points_O[i]);
+      if (i >= kSurfelsAhead && i - kSurfelsAhead < n) {
+        look_up(queries[(i - kSurfelsAhead) % kSlotsAhead]);
+      }
+    }
+  }
 
   /// Whether some cell of the coarsest level that holds a surfel contains p_O.
   [[nodiscard]] bool occupied(const Vec3& p_O) const;
@@ -75,6 +91,7 @@ class SurfelMap {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffU;
+  static constexpr std::size_t kMostLevels = 4;
 
   /// Moments in G relative to the cell's centre, weights relative to 1 cm of noise. One cache line.
   struct alignas(64) Cell {
@@ -108,6 +125,17 @@ class SurfelMap {
     std::vector<Surfel> surfels;
     std::size_t hand = 0;  ///< CLOCK's
   };
+
+  /// A point and the cells that hold it, one of each level. Asked in three steps, of which each
+  /// asks the memory for what the next reads.
+  struct Query {
+    Vec3 p_G;
+    std::array<std::uint64_t, kMostLevels> keys;
+    std::array<std::uint32_t, kMostLevels> cells;
+  };
+  [[nodiscard]] Query begin(const Vec3& p_O) const;
+  void look_up(Query& query) const;
+  [[nodiscard]] std::optional<SurfelMatch> answer(const Query& query) const;
 
   /// The slot that holds `key`, or the empty one where it would go.
   static std::size_t slot_of(const Level& level, std::uint64_t key);

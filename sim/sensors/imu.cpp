@@ -33,10 +33,12 @@ ImuModel::ImuModel(const ImuConfig& config, std::uint64_t seed)
       gyro_(make_triad(config, true, seed)),
       accel_(make_triad(config, false, seed)),
       vibration_(config.vibration, seed),
-      gyro_filter_(config.output_cutoff_hz),
-      accel_filter_(config.output_cutoff_hz),
       magnetometer_stream_(seed, "imu.magnetometer"),
       barometer_stream_(seed, "imu.barometer") {
+  if (config.output_cutoff_hz > 0) {
+    gyro_filter_.emplace(config.output_cutoff_hz);
+    accel_filter_.emplace(config.output_cutoff_hz);
+  }
   hard_iron_gauss_ = config.magnetometer_bias_sigma_gauss * magnetometer_stream_.normal3();
 }
 
@@ -53,12 +55,13 @@ ImuSample ImuModel::sample(const Truth& truth) {
   sample_field(truth, raw.stamp);
   sample_pressure(truth, raw.stamp);
   raw.field_gauss = field_gauss_;
-  const Vec3 gyro = gyro_filter_.filter(raw.gyro_radps);
-  const Vec3 accel = accel_filter_.filter(raw.accel_mps2);
+  gyro_mean_.add(gyro_filter_ ? gyro_filter_->filter(raw.gyro_radps) : raw.gyro_radps);
+  accel_mean_.add(accel_filter_ ? accel_filter_->filter(raw.accel_mps2) : raw.accel_mps2);
   output_.reset();
   if (due(truth.stamp, config_.output_rate_hz)) {
-    // Without noise the delay of the filter would be the only error left.
-    output_ = config_.noise_free ? raw : ImuSample{raw.stamp, gyro, accel, field_gauss_};
+    const ImuSample mean{raw.stamp, gyro_mean_.take(), accel_mean_.take(), field_gauss_};
+    // Without noise the delay of the mean would be the only error left.
+    output_ = config_.noise_free ? raw : mean;
   }
   return raw;
 }
@@ -88,6 +91,17 @@ Vec3 ImuModel::Triad::measure(const Vec3& value) {
   bias += walk_sigma * stream.normal3();
   const Vec3 sensed = scale.cwiseProduct(value) + bias + white_sigma * stream.normal3();
   return sensed.cwiseMax(-range).cwiseMin(range);
+}
+
+void ImuModel::Mean::add(const Vec3& value) {
+  sum += value;
+  ++count;
+}
+
+Vec3 ImuModel::Mean::take() {
+  const Vec3 mean = sum / count;
+  *this = {};
+  return mean;
 }
 
 // Bilinear transform of 1 / (s^2 + sqrt(2) s + 1), pre-warped to the cut-off.

@@ -26,7 +26,7 @@ struct ImuConfig {
   double accel_range_mps2 = 16 * kGravity;    ///< 16 g
   double clock_offset_s = 0;                  ///< the device's clock minus true time
   int output_rate_hz = 200;                   ///< paper, II-A
-  double output_cutoff_hz = 90;               ///< [E] just below half the output rate
+  double output_cutoff_hz = 0;                ///< low-pass of the raw samples; 0: none
   VibrationConfig vibration;
   int magnetometer_rate_hz = 200;                 ///< paper, III-A: nine axes at 200 Hz
   Vec3 earth_field_gauss{-0.019, 0.375, -0.253};  ///< IGRF near Guangzhou, W as east-north-up
@@ -52,7 +52,8 @@ struct ImuConfig {
     f("accel_range_mps2", accel_range_mps2, "clipped beyond: 16 g");
     f("clock_offset_s", clock_offset_s, "the device's clock minus true time");
     f("output_rate_hz", output_rate_hz, "samples to the stack (paper, II-A)");
-    f("output_cutoff_hz", output_cutoff_hz, "second-order low-pass before decimation [E]");
+    f("output_cutoff_hz", output_cutoff_hz,
+      "second-order low-pass before samples are integrated over an output's interval; 0: none");
     f("vibration", vibration, "what the rotors shake into it");
     f("magnetometer_rate_hz", magnetometer_rate_hz, "samples (paper, III-A)");
     f("earth_field_gauss", earth_field_gauss, "in W, taken as east-north-up: near Guangzhou");
@@ -72,7 +73,7 @@ struct ImuConfig {
     f.check(accel_scale_sigma_fraction >= 0, "accel_scale_sigma_fraction >= 0");
     f.check(accel_range_mps2 > kGravity, "accel_range_mps2 > 9.80665");
     f.check(divides_kilohertz(output_rate_hz), "output_rate_hz divides 1000");
-    f.check(output_cutoff_hz > 0 && output_cutoff_hz < 500, "0 < output_cutoff_hz < 500");
+    f.check(output_cutoff_hz >= 0 && output_cutoff_hz < 500, "0 <= output_cutoff_hz < 500");
     f.check(divides_kilohertz(magnetometer_rate_hz), "magnetometer_rate_hz divides 1000");
     f.check(magnetometer_noise_density >= 0, "magnetometer_noise_density >= 0");
     f.check(magnetometer_bias_sigma_gauss >= 0, "magnetometer_bias_sigma_gauss >= 0");
@@ -93,8 +94,12 @@ class ImuModel {
   ImuSample sample(const Truth& truth);
 
   // What else fell due at the newest tick.
-  /// Low-passed and decimated: vibration above half the output rate aliases. With the newest sample
-  /// of the magnetometer.
+  /// The mean of the raw samples since the output before, as an autopilot hands on what it has
+  /// integrated: the turn that the outputs add up to is the raw samples' own. Vibration above half
+  /// the output rate aliases, but for multiples of that rate, which would be taken for a standing
+  /// turn. With the newest sample of the magnetometer.
+  ///
+  /// Source: PX4's vehicle_imu integrates the gyro's samples (Integrator.hpp) before it publishes.
   [[nodiscard]] const std::optional<ImuSample>& output() const { return output_; }
   [[nodiscard]] const std::optional<MagnetometerSample>& magnetometer() const {
     return magnetometer_;
@@ -121,6 +126,13 @@ class ImuModel {
     bool primed = false;
     Vec3 x1 = Vec3::Zero(), x2 = Vec3::Zero(), y1 = Vec3::Zero(), y2 = Vec3::Zero();
   };
+  /// Of the samples since it was last taken.
+  struct Mean {
+    void add(const Vec3& value);
+    Vec3 take();
+    Vec3 sum = Vec3::Zero();
+    int count = 0;
+  };
   static Triad make_triad(const ImuConfig& config, bool gyro, std::uint64_t seed);
   void sample_field(const Truth& truth, Stamp stamp);
   void sample_pressure(const Truth& truth, Stamp stamp);
@@ -128,7 +140,8 @@ class ImuModel {
   ImuConfig config_;
   Triad gyro_, accel_;
   VibrationModel vibration_;
-  LowPass gyro_filter_, accel_filter_;
+  std::optional<LowPass> gyro_filter_, accel_filter_;
+  Mean gyro_mean_, accel_mean_;
   RandomStream magnetometer_stream_, barometer_stream_;
   Vec3 hard_iron_gauss_ = Vec3::Zero();
   Vec3 field_gauss_ = Vec3::Zero();  ///< newest sample

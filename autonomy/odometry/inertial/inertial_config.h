@@ -6,7 +6,7 @@ namespace arex {
 
 /// What an odometry believes of its IMU.
 struct ImuNoiseConfig {
-  double delay_s = 0.0025;                  ///< of the readings behind their stamps
+  double delay_s = 0.002;                   ///< of the readings behind their stamps
   double delay_std_s = 0.001;               ///< 1 sigma of that before take-off
   double unknown_delay_std_s = 0.03;        ///< 1 sigma once it turns out to be another
   double delay_walk_density = 2e-4;         ///< s/sqrt(s)
@@ -21,8 +21,8 @@ struct ImuNoiseConfig {
 
   void fields(auto& f) {
     f("delay_s", delay_s,
-      "how far the readings lie behind their stamps: the group delay of the autopilot's low-pass, "
-      "sqrt(2) / (2 pi 90 Hz); a known offset of its clock is added. Estimated from there on");
+      "how far the readings lie behind their stamps: each is the mean of five samples, of which "
+      "the middle one is 2 ms old; a known offset of its clock is added. Estimated from there on");
     f("delay_std_s", delay_std_s,
       "1 sigma of the delay before take-off. A looser one lets the first second in the air, whose "
       "few "
@@ -43,7 +43,7 @@ struct ImuNoiseConfig {
     f("gyro_scale_noise_density", gyro_scale_noise_density,
       "1/sqrt(Hz), times the rate: errors of scale and alignment");
     f("accel_noise_density", accel_noise_density,
-      "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and the vibration that its filter aliases");
+      "m/s^2/sqrt(Hz): the sensor's 1.4e-3 and aliased vibration");
     f("gyro_walk_density", gyro_walk_density, "rad/s^2/sqrt(Hz): the sensor's");
     f("accel_walk_density", accel_walk_density, "m/s^3/sqrt(Hz): the sensor's");
     f("gyro_range_radps", gyro_range_radps,

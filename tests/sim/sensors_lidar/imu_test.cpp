@@ -182,34 +182,86 @@ TEST(ImuModel, ClipsAtItsRange) {
   EXPECT_TRUE(sample.accel_mps2.isApprox(Vec3(-16 * kGravity, 0, 16 * kGravity)));
 }
 
-TEST(ImuModel, OutputAliasesAsTheFilterLeavesIt) {
-  // 114 Hz, about one per revolution, lies above half of 200 Hz and comes out at 86 Hz.
-  ImuModel imu(quiet(), 7);
+/// Of the mean of five samples of 1 kHz: Dirichlet's kernel.
+double mean_of_five(double frequency_hz) {
+  const double half_turn = kPi * 1e-3 * frequency_hz;
+  return std::abs(std::sin(5 * half_turn) / (5 * std::sin(half_turn)));
+}
+
+/// Of a second-order Butterworth low-pass, pre-warped to its cut-off.
+double low_pass(double frequency_hz, double cutoff_hz) {
+  const double ratio = std::tan(kPi * 1e-3 * frequency_hz) / std::tan(kPi * 1e-3 * cutoff_hz);
+  return 1 / std::sqrt(1 + std::pow(ratio, 4));
+}
+
+std::vector<double> output_of_a_line(const ImuConfig& config, double frequency_hz) {
+  ImuModel imu(config, 7);
   std::vector<double> output;
   for (int i = 0; i < 4000; ++i) {
     Truth truth = at_tick(i);
-    truth.a_WB.x() = std::cos(2 * kPi * 0.114 * i);
+    truth.a_WB.x() = std::cos(2 * kPi * 1e-3 * frequency_hz * i);
     imu.sample(truth);
+    // The first of four seconds still holds the filter's transient, 0.1 % of the record.
     if (imu.output()) output.push_back(imu.output()->accel_mps2.x());
   }
-  const double ratio = std::tan(kPi * 114e-3) / std::tan(kPi * 90e-3);
-  const double expected = 1 / std::sqrt(1 + std::pow(ratio, 4));
-  // The first of four seconds still holds the filter's transient, 0.1 % of the record.
-  EXPECT_NEAR(amplitude(output, 86, 200), expected, 0.02 * expected);
-  EXPECT_LT(amplitude(output, 50, 200), 0.02 * expected);
+  return output;
 }
 
-TEST(ImuModel, OutputPassesSlowMotionWithTheFiltersDelay) {
-  // A second-order Butterworth delays slow signals by sqrt 2 / (2 pi f).
+TEST(ImuModel, OutputAliasesAsTheMeanLeavesIt) {
+  // 114 Hz, about one per revolution, lies above half of 200 Hz and comes out at 86 Hz.
   ImuConfig config = quiet();
-  ImuModel imu(config, 8);
-  const double delay_s = std::numbers::sqrt2 / (2 * kPi * config.output_cutoff_hz);
-  for (int i = 0; i < 2000; ++i) {
-    Truth truth = at_tick(i);
-    truth.w_WB_B.x() = std::sin(2 * kPi * 1e-3 * i);  // 1 Hz
-    imu.sample(truth);
-    if (!imu.output() || i < 500) continue;
-    EXPECT_NEAR(imu.output()->gyro_radps.x(), std::sin(2 * kPi * (1e-3 * i - delay_s)), 1e-3);
+  for (const double cutoff_hz : {0., 90.}) {
+    config.output_cutoff_hz = cutoff_hz;
+    const double expected =
+        mean_of_five(114) * (cutoff_hz > 0 ? low_pass(114, cutoff_hz) : 1);
+    const std::vector<double> output = output_of_a_line(config, 114);
+    EXPECT_NEAR(amplitude(output, 86, 200), expected, 0.02 * expected);
+    EXPECT_LT(amplitude(output, 50, 200), 0.02 * expected);
+  }
+}
+
+TEST(ImuModel, ALineAtTheOutputsRateIsNotTakenForAStandingTurn) {
+  // Every fifth sample of it is the same one.
+  const std::vector<double> output = output_of_a_line(quiet(), 200);
+  for (std::size_t i = 1; i < output.size(); ++i) ASSERT_NEAR(output[i], 0, 1e-12);
+}
+
+// What the stack integrates is what the sensor felt, also while rotors start and their lines sweep
+// over multiples of the output's rate.
+TEST(ImuModel, OutputsAddUpToTheRawSamples) {
+  ImuConfig config;
+  config.vibration.level = VibrationLevel::kRough;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    ImuModel imu(config, seed);
+    Vec3 raw = Vec3::Zero(), output = Vec3::Zero();
+    for (int i = 0; i <= 5000; ++i) {
+      Truth truth = at_tick(i);
+      truth.rotor_radps.fill(std::min(0.4 * i, 900.));
+      const ImuSample sample = imu.sample(truth);
+      if (i == 0) continue;  // the first output has but one sample
+      raw += 1e-3 * sample.gyro_radps;
+      if (imu.output()) output += 5e-3 * imu.output()->gyro_radps;
+    }
+    EXPECT_LT((output - raw).norm(), 1e-12);
+    EXPECT_GT(raw.norm(), 1e-4);
+  }
+}
+
+TEST(ImuModel, OutputPassesSlowMotionWithItsDelay) {
+  // The middle of five samples is two old; a second-order Butterworth adds sqrt 2 / (2 pi f).
+  ImuConfig config = quiet();
+  for (const double cutoff_hz : {0., 90.}) {
+    config.output_cutoff_hz = cutoff_hz;
+    ImuModel imu(config, 8);
+    const double delay_s =
+        0.002 + (cutoff_hz > 0 ? std::numbers::sqrt2 / (2 * kPi * cutoff_hz) : 0);
+    for (int i = 0; i < 2000; ++i) {
+      Truth truth = at_tick(i);
+      truth.w_WB_B.x() = std::sin(2 * kPi * 1e-3 * i);  // 1 Hz
+      imu.sample(truth);
+      if (!imu.output() || i < 500) continue;
+      EXPECT_NEAR(imu.output()->gyro_radps.x(), std::sin(2 * kPi * (1e-3 * i - delay_s)), 1e-3);
+    }
   }
 }
 

@@ -36,6 +36,7 @@ void LidarInertialOdometry::apply(const ScanUpdate& update) {
   scan_status_ = update.status;
   scan_need_ = update.need;
   odometry_.correction_stamp = update.correction_stamp;
+  silence_.end_interval();
   corrected_ = update.pose_covariance;
   corrected_velocity_ = update.covariance.block<3, 3>(kVelocity, kVelocity);
   imu_noise_ = update.imu_noise;
@@ -57,9 +58,8 @@ ScanUpdate LidarInertialOdometry::add_scan(const LidarScanPtr& scan) {
 
 OdometryNeed LidarInertialOdometry::need() const {
   if (odometry_.status == OdometryStatus::kOk) return OdometryNeed::kNothing;
-  const bool silent =
-      to_seconds(newest_.stamp - odometry_.correction_stamp) > health_.degenerate_silence_s;
-  return silent && scan_status_ != OdometryStatus::kInitialising ? OdometryNeed::kScan : scan_need_;
+  const bool silent = silence_.lasts() && scan_status_ != OdometryStatus::kInitialising;
+  return silent ? OdometryNeed::kScan : scan_need_;
 }
 
 void LidarInertialOdometry::publish() {
@@ -75,9 +75,10 @@ void LidarInertialOdometry::publish() {
   odometry_.w_OB_B = state->rate(newest_.gyro_radps);
   odometry_.covariance = covariance_at(odometry_.stamp);
   const double silence_s = to_seconds(odometry_.stamp - odometry_.correction_stamp);
+  const bool silent = silence_.wait(silence_s);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
-  } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {
+  } else if (silent && odometry_.status == OdometryStatus::kOk) {
     odometry_.status = OdometryStatus::kDegenerate;
   }
 }

@@ -5,6 +5,7 @@
 #include "messages/estimates.h"
 #include "messages/vehicle.h"
 #include "odometry/inertial/imu_predictor.h"
+#include "odometry/inertial/silence.h"
 #include "odometry/scan_corrector.h"
 
 namespace arex {
@@ -59,6 +60,7 @@ class LidarInertialOdometry {
   [[nodiscard]] PoseCovariance covariance_at(Stamp stamp) const;
 
   OdometryHealthConfig health_;
+  Silence silence_{health_.degenerate_silence_s};
   ScanCorrector corrector_;
   ImuPredictor predictor_;
   double imu_delay_s_;

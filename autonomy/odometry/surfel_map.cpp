@@ -258,8 +258,7 @@ std::optional<SurfelMatch> SurfelMap::answer(const Query& query) const {
     const Level& level = levels_[l];
     const Surfel& surfel = level.surfels[query.cells[l]];
     if (surfel.thickness_m2 < 0) continue;
-    const Vec3 mean =
-        centre_of(query.p_G, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
+    const Vec3 mean = centre_of(query.p_G, level.edge_m, level.inverse_edge) + to_vec3(surfel.mean);
     const Vec3 d = query.p_G - mean;
     const double variance = surfel.thickness_m2 + d.dot(to_symmetric(surfel.regression) * d);
     if (best == nullptr || variance < least) {

@@ -31,6 +31,14 @@ StoppingModel stopping_of(const StackConfig& stack) {
           planning.local.reaction_s + planning.replan.planning_latency_s};
 }
 
+/// Whether a vehicle is where nothing is: too far off for any sensor, or below all ground. It goes
+/// on as long as its battery does, and no flight software finds back from there.
+bool has_left(const worlds::Bounds& bounds, const Vec3& p_W) {
+  constexpr double kFarthest_m = 100, kDeepest_m = 2;
+  const Vec3 nearest = p_W.cwiseMax(bounds.low).cwiseMin(bounds.high);
+  return (p_W - nearest).norm() > kFarthest_m || p_W.z() < bounds.low.z() - kDeepest_m;
+}
+
 /// What the omniscient tour has in common with the mission.
 TourMission tour_mission_of(const StackConfig& stack) {
   const MissionConfig& mission = stack.mission;
@@ -298,6 +306,8 @@ void Simulation::check_end() {
       display.event({now_, EventKind::kCollision, what});
     }
     end(Outcome::kCollided, "hit " + what);
+  } else if (has_left(world_.bounds, truth().X_WB.p)) {
+    end(Outcome::kLost, "left the world");
   } else if (const FlightView view = stack_->view(); view.state == MissionState::kDone) {
     if (view.lost) {
       end(Outcome::kLost, "no odometry");

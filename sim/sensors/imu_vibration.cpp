@@ -21,8 +21,8 @@ constexpr std::array<Mode, AxisVibration::kModes> kModes{{{10, 0.5}, {45, 0.35},
 
 // Fitted by non-negative least squares to the spectra (Welch, 200 Hz) of the recordings, aliases
 // included, with rotors about 114 Hz as this vehicle's. The fit was made behind a second-order
-// low-pass at 90 Hz; lines are as much less (0.93, 0.85) as the output's mean now lets through more.
-// RMS above 5 Hz and what the fits leave: models/arex/README.md.
+// low-pass at 90 Hz; lines are as much less (0.93, 0.85) as the output's mean now lets through
+// more. RMS above 5 Hz and what the fits leave: models/arex/README.md.
 constexpr VibrationSpectrum kNone{};
 constexpr VibrationSpectrum kSmooth{{{0.062, {0.061, 0, 0.111}, 1.78, 0.90},
                                      {0.019, {0.007, 0, 0.061}, 0.75, 2.35},

@@ -47,6 +47,7 @@ void VisualInertialOdometry::apply(const VisualUpdate& update) {
   update_ = update;
   odometry_.correction_stamp = update.correction_stamp;
   odometry_.status = update.status;
+  silence_.end_interval();
   if (update.status == OdometryStatus::kInitialising) return;
   predictor_.anchor(update.stamp, update.state, update.accel_scale, {});
   publish();
@@ -54,8 +55,7 @@ void VisualInertialOdometry::apply(const VisualUpdate& update) {
 
 OdometryNeed VisualInertialOdometry::need() const {
   if (odometry_.status == OdometryStatus::kOk) return OdometryNeed::kNothing;
-  const bool silent = to_seconds(newest_.stamp - update_.stamp) > health_.degenerate_silence_s;
-  return silent ? OdometryNeed::kImages : update_.need;
+  return silence_.lasts() ? OdometryNeed::kImages : update_.need;
 }
 
 void VisualInertialOdometry::publish() {
@@ -72,9 +72,10 @@ void VisualInertialOdometry::publish() {
   odometry_.covariance = covariance_at(odometry_.stamp + camera_ahead);
   // The images may have stopped, too.
   const double silence_s = to_seconds(odometry_.stamp + camera_ahead - odometry_.correction_stamp);
+  const bool silent = silence_.wait(silence_s);
   if (silence_s > health_.lost_silence_s) {
     odometry_.status = OdometryStatus::kLost;
-  } else if (silence_s > health_.degenerate_silence_s && odometry_.status == OdometryStatus::kOk) {
+  } else if (silent && odometry_.status == OdometryStatus::kOk) {
     odometry_.status = OdometryStatus::kDegenerate;
   }
 }

@@ -7,6 +7,7 @@
 #include "messages/estimates.h"
 #include "messages/stereo_image.h"
 #include "odometry/inertial/imu_predictor.h"
+#include "odometry/inertial/silence.h"
 #include "odometry/visual/feature_tracker.h"
 #include "odometry/visual/visual_estimator.h"
 #include "odometry/visual/visual_inertial_config.h"
@@ -62,6 +63,7 @@ class VisualInertialOdometry {
   [[nodiscard]] Eigen::Matrix<double, 6, 6> covariance_at(Stamp stamp) const;
 
   VisualHealthConfig health_;
+  Silence silence_{health_.degenerate_silence_s};
   double imu_delay_s_;
   FeatureTracker tracker_;
   VisualEstimator estimator_;

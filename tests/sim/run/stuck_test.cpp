@@ -39,6 +39,22 @@ FlightResult fly_gaps(std::vector<std::string> overrides) {
   return fly(load_scenario(AREX_SOURCE_DIR "/scenarios/gaps.yaml", overrides, 1));
 }
 
+// Carried off by the wind, it has nothing to come back to: the flight ends there, not when its time
+// is over, far out or far below.
+TEST(Lost, WhereNothingIsTheFlightEnds) {
+  for (const char* wind : {"[16, 0, 0]", "[18, 0, 0]"}) {
+    const FlightResult result = fly(
+        load_scenario(AREX_SOURCE_DIR "/scenarios/blind_legs.yaml",
+                      {std::string("physics.wind.mean_mps=") + wind,
+                       "control.position_gain=[0.5, 0.5, 12]", "control.velocity_gain=[1, 1, 7.8]",
+                       "control.observe_disturbance=false", "mission.max_time_s=300"},
+                      1));
+    EXPECT_EQ(result.outcome, Outcome::kLost) << result.reason;
+    EXPECT_EQ(result.reason, "left the world");
+    EXPECT_LT(to_seconds(result.duration), 120);
+  }
+}
+
 TEST(Ready, ALidarThatComesLateIsWaitedFor) {
   for (const char* silence : {"0.7", "1.1", "2.6", "9"}) {
     const FlightResult result = fly_legs({std::string("lidar.fault_silent_for_s=") + silence});

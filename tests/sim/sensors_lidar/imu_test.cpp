@@ -212,8 +212,7 @@ TEST(ImuModel, OutputAliasesAsTheMeanLeavesIt) {
   ImuConfig config = quiet();
   for (const double cutoff_hz : {0., 90.}) {
     config.output_cutoff_hz = cutoff_hz;
-    const double expected =
-        mean_of_five(114) * (cutoff_hz > 0 ? low_pass(114, cutoff_hz) : 1);
+    const double expected = mean_of_five(114) * (cutoff_hz > 0 ? low_pass(114, cutoff_hz) : 1);
     const std::vector<double> output = output_of_a_line(config, 114);
     EXPECT_NEAR(amplitude(output, 86, 200), expected, 0.02 * expected);
     EXPECT_LT(amplitude(output, 50, 200), 0.02 * expected);

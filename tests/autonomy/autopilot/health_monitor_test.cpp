@@ -40,13 +40,14 @@ std::string tell(const Vec4& missing_n, std::uint64_t seed, const Vec4& more = V
 
 TEST(MotorWatch, NamesTheMotorThatIsWeak) {
   for (int motor = 0; motor < 4; ++motor) {
-    for (const double share : {0.1, 0.3}) {
+    for (const double share : {0.1, 0.3, 0.6}) {  // the last: 30 % of twice its hover thrust
       for (std::uint64_t seed = 1; seed <= 5; ++seed) {
         Vec4 missing = Vec4::Zero();
         missing[motor] = share * kWeight / 4;
         const std::string told = tell(missing, seed);
         EXPECT_EQ(told.substr(0, 13), "motor " + std::to_string(motor + 1) + " weak:")
             << share << " seed " << seed << ": " << told;
+        EXPECT_EQ(told.find("stopped"), std::string::npos) << told;
       }
     }
   }

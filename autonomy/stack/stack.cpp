@@ -23,7 +23,8 @@ bool is_over(std::string_view detail) {
   return detail.ends_with("again") || detail.ends_with("any more") || detail.ends_with("over");
 }
 
-/// The first trouble that is not over: what came after it is more likely its consequence.
+/// The first trouble that is not over: what came after it is more likely its consequence. The
+/// battery's current swings with the motors, though, and shows first what ails them or the frame.
 std::string trouble_after(std::string trouble, EventKind kind, const std::string& detail) {
   std::string name;
   if (kind == EventKind::kVibration) name = "vibration";
@@ -31,7 +32,8 @@ std::string trouble_after(std::string trouble, EventKind kind, const std::string
     name = detail.substr(0, detail.find(':'));
   }
   if (name.empty()) return trouble;
-  if (!is_over(detail)) return trouble.empty() ? name : trouble;
+  const bool symptom = trouble == "power noisy" && kind != EventKind::kSensorFault;
+  if (!is_over(detail)) return trouble.empty() || symptom ? name : trouble;
   const std::string whose = name.substr(0, name.find(' '));
   return trouble.starts_with(whose) ? std::string() : trouble;
 }

@@ -51,6 +51,10 @@ class Renderer {
   /// is nothing. Of two in the same place it is the one drawn first, which the pose decides.
   void render_triangles(const Pose& X_WC, std::vector<float>& inverse_depth,
                         std::vector<std::uint32_t>& triangles);
+  /// The same for who wants to read it row by row: what it draws stays until the next picture.
+  void draw_triangles(const Pose& X_WC);
+  /// Of draw_triangles(), `count` rows from v on, one behind the other.
+  void read_rows(int v, int count, float* inverse_depth, std::uint32_t* triangles) const;
 
   /// What the last frame drew.
   [[nodiscard]] Statistics last_frame() const;

@@ -1,0 +1,307 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+#include "messages/sensors.h"
+#include "sensors/eight.h"
+
+/// The pixels of the renderer's triangles. Included by renderer.cpp alone, whose options it needs.
+namespace arex::sim {
+
+// Pixels are decided four at a time: GCC's vectors, whose arithmetic is each number's own.
+constexpr int kLanes = 4;
+using Double4 = double __attribute__((vector_size(32)));
+using Long4 = std::int64_t __attribute__((vector_size(32)));
+using Uint4 = std::uint32_t __attribute__((vector_size(16)));
+using Int4 = std::int32_t __attribute__((vector_size(16)));
+using Float4 = float __attribute__((vector_size(16)));
+
+template <class Vector, class Scalar>
+Vector load_vector(const Scalar* from) {
+  Vector v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+}
+
+inline Double4 all_lanes(double value) { return Double4{value, value, value, value}; }
+
+/// Bit i: whether a comparison holds in lane i.
+inline unsigned lanes_of(const Long4& held) {
+#ifdef __AVX__
+  return static_cast<unsigned>(__builtin_ia32_movmskpd256((Double4)held));
+#else
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 4; ++i) bits |= held[i] != 0 ? 1U << i : 0U;
+  return bits;
+#endif
+}
+
+/// Pixels from the first up to the last, both included.
+struct PixelBox {
+  int u_first = 0, u_last = -1, v_first = 0, v_last = -1;
+  [[nodiscard]] bool empty() const { return u_first > u_last || v_first > v_last; }
+};
+
+/// A triangle as linear functions of a pixel's ray (x, y, 1): its three edges, of which none is
+/// negative where the ray passes inside, and the last is 1/z of its plane, 1/m. Each is
+/// of_x x + (of_y y + of_one), rounded: it goes one way along x and one way along y, so that it is
+/// greatest and least at corners of any rectangle of pixels, to the last bit.
+///
+/// No zero of of_one has a sign: so none of a sum has, and what has one is less than zero.
+struct Footprint {
+  static constexpr std::size_t kFunctions = 4, kInverseDepth = 3;
+  Double4 of_x, of_y, of_one;
+};
+
+/// A picture under way: the nearest depths so far, and the triangles that have them.
+///
+/// It is made of tiles of 4 x 4 pixels: a leaf's lie in one place of the memory or two, where a row
+/// of depths and one of triangles would be two for each row that it covers. Tiles that a triangle
+/// misses, or that are nearer all over, are told by their corners, four of them at a time.
+template <bool with_triangles>
+class TiledPicture {
+ public:
+  static constexpr int kSide = kLanes;  ///< of a tile, px
+
+  explicit TiledPicture(const PinholeCamera& camera) : camera_(camera) {
+    columns_ = static_cast<std::size_t>((camera.width + kSide - 1) / kSide);
+    rows_ = static_cast<std::size_t>((camera.height + kSide - 1) / kSide);
+    for (int u = 0; u < static_cast<int>(columns_ + kLanes) * kSide; ++u) {
+      ray_x_.push_back((u - camera.cx) / camera.fx);
+    }
+    for (int v = 0; v < static_cast<int>(rows_ + kLanes) * kSide; ++v) {
+      ray_y_.push_back((v - camera.cy) / camera.fy);
+    }
+    for (std::size_t i = 0; i < columns_ + kLanes; ++i) {
+      border_x_[0].push_back(ray_x_[i * kSide]);
+      border_x_[1].push_back(ray_x_[i * kSide + kSide - 1]);
+    }
+    for (std::size_t i = 0; i < rows_ + kLanes; ++i) {
+      border_y_[0].push_back(ray_y_[i * kSide]);
+      border_y_[1].push_back(ray_y_[i * kSide + kSide - 1]);
+    }
+  }
+
+  /// Nothing is drawn yet.
+  void clear() {
+    tiles_.resize(columns_ * rows_);
+    least_.assign(tiles_.size() + kLanes, kUntouched);
+  }
+
+  /// Draws a triangle where it covers a pixel's centre within the box and nothing drawn is as near.
+  /// @param most 1/z of the nearest that is drawn, 1/m
+  void fill(const Footprint& footprint, const PixelBox& box, double most, std::uint32_t triangle) {
+    const std::size_t left = static_cast<std::size_t>(box.u_first) / kSide * kSide;
+    const std::size_t right = static_cast<std::size_t>(box.u_last) / kSide * kSide + kSide - 1;
+    const double nearest =
+        footprint.of_x[3] * ray_x_[footprint.of_x[3] > 0 ? right : left] +
+        (footprint.of_y[3] *
+             ray_y_[static_cast<std::size_t>(footprint.of_y[3] > 0 ? box.v_last : box.v_first)] +
+         footprint.of_one[3]);
+    const bool wide = box.u_last - box.u_first >= kWide;
+    if (nearest <= most) {
+      wide ? fill_rows<true, false>(footprint, box, most, triangle)
+           : fill_rows<false, false>(footprint, box, most, triangle);
+    } else {
+      fill_rows<true, true>(footprint, box, most, triangle);
+    }
+  }
+
+  /// 1/z of a row's pixels, 1/m, and their triangles: of each tile's part.
+  template <class Visit>
+  void visit_row(int v, const Visit& visit) const {
+    static constexpr Tile kNothing{};
+    const std::size_t first = static_cast<std::size_t>(v / kSide) * columns_;
+    const auto within = static_cast<std::size_t>(v % kSide * kSide);
+    for (std::size_t i = 0; i < columns_; ++i) {
+      const Tile& tile = least_[first + i] == kUntouched ? kNothing : tiles_[first + i];
+      const int count = std::min(kSide, camera_.width - static_cast<int>(i) * kSide);
+      if constexpr (with_triangles) {
+        visit(&tile.inverse_depth[within], &tile.triangle[within], count);
+      } else {
+        visit(&tile.inverse_depth[within], count);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kPixels = kSide * kSide;
+  // From this width on, the run of tiles between the edges is worth looking for, px.
+  static constexpr int kWide = 16;
+  static constexpr float kUntouched = -1;
+
+  struct alignas(64) DepthTile {
+    std::array<float, kPixels> inverse_depth{};  ///< 1/z so far, rows from the top
+  };
+  struct alignas(64) TriangleTile {
+    std::array<float, kPixels> inverse_depth{};
+    std::array<std::uint32_t, kPixels> triangle{};  ///< where anything is drawn
+  };
+  using Tile = std::conditional_t<with_triangles, TriangleTile, DepthTile>;
+
+  /// The functions of a footprint in four rows or tiles: [function][row].
+  using Rows = std::array<std::array<double, kLanes>, Footprint::kFunctions>;
+
+  /// Each function at x = 0 in four rows of given y.
+  static void find_rows(const Footprint& footprint, const std::array<const double*, 4>& y,
+                        Rows& rows) {
+    for (std::size_t i = 0; i < Footprint::kFunctions; ++i) {
+      const auto lane = static_cast<int>(i);
+      const Double4 along =
+          footprint.of_y[lane] * load_vector<Double4>(y[i]) + footprint.of_one[lane];
+      std::memcpy(rows[i].data(), &along, sizeof along);
+    }
+  }
+
+  template <bool wide, bool cut_near>
+  void fill_rows(const Footprint& footprint, const PixelBox& box, double most,
+                 std::uint32_t triangle) {
+    const Double4 zero{};
+    const unsigned falls_right = lanes_of((Long4)footprint.of_x);
+    const unsigned falls_down = lanes_of((Long4)footprint.of_y);
+    // Where each function is greatest in tiles, and least.
+    std::array<const double*, 4> x_most, x_least, y_most, y_least;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const unsigned left = falls_right >> i & 1U, top = falls_down >> i & 1U;
+      x_most[i] = border_x_[1 - left].data();
+      y_most[i] = border_y_[1 - top].data();
+      x_least[i] = border_x_[left].data();
+      y_least[i] = border_y_[top].data();
+    }
+    const auto first_row = static_cast<std::size_t>(box.v_first / kSide);
+    const auto last_row = static_cast<std::size_t>(box.v_last / kSide);
+    const Double4 roots = wide ? -1.0 / footprint.of_x : zero;  // zero at x = root * (value at 0)
+    Rows greatest, smallest, rows;
+    for (std::size_t row = first_row; row <= last_row; ++row) {
+      const std::size_t k = (row - first_row) % kLanes;
+      if (k == 0) {
+        find_rows(footprint, {y_most[0] + row, y_most[1] + row, y_most[2] + row, y_most[3] + row},
+                  greatest);
+        if (wide) {
+          find_rows(footprint,
+                    {y_least[0] + row, y_least[1] + row, y_least[2] + row, y_least[3] + row},
+                    smallest);
+        }
+      }
+      double u_first = box.u_first, u_last = box.u_last;
+      if constexpr (wide) {
+        // A pixel of slack on both sides: the tiles' corners decide.
+        for (int i = 0; i < 3; ++i) {
+          const double at_centre = greatest[static_cast<std::size_t>(i)][k];
+          const double u = camera_.cx + camera_.fx * (at_centre * roots[i]);
+          if (footprint.of_x[i] > 0) u_first = std::max(u_first, u - 1);
+          if (footprint.of_x[i] < 0) u_last = std::min(u_last, u + 1);
+          if (footprint.of_x[i] == 0 && at_centre < 0) u_last = u_first - 1;
+        }
+        if (u_first > u_last) continue;
+      }
+      const auto last_column = static_cast<std::size_t>(static_cast<int>(u_last) / kSide);
+      bool rows_found = false;
+      for (auto column = static_cast<std::size_t>(static_cast<int>(u_first) / kSide);
+           column <= last_column; column += kLanes) {
+        const std::size_t tile = row * columns_ + column;
+        const auto function = [&](std::size_t i, const std::array<const double*, 4>& x,
+                                  const Rows& row_values) {
+          return footprint.of_x[static_cast<int>(i)] * load_vector<Double4>(x[i] + column) +
+                 row_values[i][k];
+        };
+        const auto negative = [&](const std::array<const double*, 4>& x, const Rows& row_values) {
+          return (Long4)function(0, x, row_values) | (Long4)function(1, x, row_values) |
+                 (Long4)function(2, x, row_values);
+        };
+        const auto least = __builtin_convertvector(load_vector<Float4>(&least_[tile]), Double4);
+        const Long4 hidden = function(3, x_most, greatest) < least;
+        unsigned live = ~lanes_of(negative(x_most, greatest) | hidden) & 0b1111U;
+        live &= 0b1111U >> (kLanes - std::min<std::size_t>(last_column - column + 1, kLanes));
+        if (live == 0) continue;
+        if (!rows_found) {
+          find_pixel_rows(footprint, row, box, rows);
+          rows_found = true;
+        }
+        unsigned inside = 0;
+        if constexpr (wide) inside = ~lanes_of(negative(x_least, smallest)) & 0b1111U;
+        for (; live != 0; live &= live - 1) {
+          const auto lane = static_cast<std::size_t>(__builtin_ctz(live));
+          const std::size_t u = (column + lane) * kSide;
+          if (wide && (inside >> lane & 1U) != 0) {
+            fill_tile<true, cut_near>(footprint, rows, u, most, triangle, tile + lane);
+          } else {
+            fill_tile<false, cut_near>(footprint, rows, u, most, triangle, tile + lane);
+          }
+        }
+      }
+    }
+  }
+
+  /// The rows of one row of tiles; of those outside of the box 1/z is less than any.
+  void find_pixel_rows(const Footprint& footprint, std::size_t row, const PixelBox& box,
+                       Rows& rows) const {
+    const double* y = &ray_y_[row * kSide];
+    find_rows(footprint, {y, y, y, y}, rows);
+    double* q = rows[Footprint::kInverseDepth].data();
+    const Long4 v = Long4{0, 1, 2, 3} + static_cast<std::int64_t>(row * kSide);
+    const Double4 in_box = (v >= box.v_first) & (v <= box.v_last)
+                               ? load_vector<Double4>(q)
+                               : all_lanes(-std::numeric_limits<double>::infinity());
+    std::memcpy(q, &in_box, sizeof in_box);
+  }
+
+  template <bool inside, bool cut_near>
+  void fill_tile(const Footprint& footprint, const Rows& rows, std::size_t u, double most,
+                 std::uint32_t triangle, std::size_t at) {
+    const auto x = load_vector<Double4>(&ray_x_[u]);
+    const Double4 x0 = footprint.of_x[0] * x, x1 = footprint.of_x[1] * x;
+    const Double4 x2 = footprint.of_x[2] * x, x3 = footprint.of_x[3] * x;
+    const auto drawn = [&](std::size_t row) {
+      Double4 q = x3 + rows[3][row];
+      if constexpr (cut_near) q = q <= most ? q : Double4{};
+      if constexpr (!inside) {
+        const Long4 negative =
+            (Long4)(x0 + rows[0][row]) | (Long4)(x1 + rows[1][row]) | (Long4)(x2 + rows[2][row]);
+        q = negative < 0 ? Double4{} : q;
+      }
+      return __builtin_convertvector(q, Float4);
+    };
+    Tile& tile = tiles_[at];
+    const Int8 touched = Int8{} - (least_[at] != kUntouched ? 1 : 0);
+    Float8 least;
+    for (std::size_t row = 0; row < kSide; row += 2) {
+      const Float8 two =
+          __builtin_shufflevector(drawn(row), drawn(row + 1), 0, 1, 2, 3, 4, 5, 6, 7);
+      float* so_far = &tile.inverse_depth[row * kSide];
+      const auto before = (Float8)((Int8)load_vector<Float8>(so_far) & touched);
+      const Float8 after = two > before ? two : before;
+      std::memcpy(so_far, &after, sizeof after);
+      if constexpr (with_triangles) {
+        std::uint32_t* seen = &tile.triangle[row * kSide];
+        const auto seen_before = load_vector<Uint8>(seen);
+        const Uint8 seen_after = two > before ? triangle - Uint8{} : seen_before;
+        std::memcpy(seen, &seen_after, sizeof seen_after);
+      }
+      least = row == 0 || after < least ? after : least;
+    }
+    const Float4 low = __builtin_shufflevector(least, least, 0, 1, 2, 3);
+    const Float4 high = __builtin_shufflevector(least, least, 4, 5, 6, 7);
+    const Float4 four = low < high ? low : high;
+    const Float4 across = __builtin_shufflevector(four, four, 2, 3, 0, 1);
+    const Float4 two = four < across ? four : across;
+    least_[at] = two[0] < two[1] ? two[0] : two[1];
+  }
+
+  PinholeCamera camera_;
+  std::size_t columns_, rows_;         ///< of tiles
+  std::vector<double> ray_x_, ray_y_;  ///< of each column and row of pixels
+  // Of each column and row of tiles: the rays through its first and last pixels.
+  std::array<std::vector<double>, 2> border_x_, border_y_;
+  std::vector<Tile> tiles_;   ///< rows from the top
+  std::vector<float> least_;  ///< of each tile's inverse depths, 1/m
+};
+
+}  // namespace arex::sim

@@ -36,16 +36,45 @@ class LightGrid {
     const auto [x, fx] = cell(p_W.x(), 0);
     const auto [y, fy] = cell(p_W.y(), 1);
     const auto [z, fz] = cell(p_W.z(), 2);
-    const auto row = static_cast<std::size_t>(count_[0]);
-    const std::size_t layer = row * static_cast<std::size_t>(count_[1]);
-    const Float8* node = &faces_[z * layer + y * row + x];
-    const auto along_x = [fx = fx](const Float8* n) { return n[0] + fx * (n[1] - n[0]); };
-    const auto along_y = [&, fy = fy](const Float8* n) {
-      const Float8 near = along_x(n);
-      return near + fy * (along_x(n + row) - near);
-    };
-    const Float8 low = along_y(node);
-    return low + fz * (along_y(node + layer) - low);
+    return between((z * rows() + y) * row() + x, fx, fy, fz);
+  }
+  /// Of a surface and of its other side, lx.
+  template <class Number>
+  struct Sides {
+    Number near, far;
+  };
+  /// That of unit normal n at p: sums of at() by the weights() of n and of -n.
+  [[nodiscard]] Sides<float> sides(const Vec3f& p_W, const Vec3f& n) const {
+    const Float8 faces = at(p_W);
+    // One face of each axis counts, the other one on the other side.
+    const int x = n.x() > 0 ? 0 : 1, y = n.y() > 0 ? 2 : 3, z = n.z() > 0 ? 4 : 5;
+    const Vec3f w = n.cwiseProduct(n);
+    return {(w.x() * faces[x] + w.y() * faces[y]) + w.z() * faces[z],
+            (w.x() * faces[x ^ 1] + w.y() * faces[y ^ 1]) + w.z() * faces[z ^ 1]};
+  }
+  /// The same of eight surfaces, by their coordinates.
+  [[nodiscard]] Sides<Float8> sides(const std::array<Float8, 3>& p_W,
+                                    const std::array<Float8, 3>& n) const {
+    const auto [x, fx] = cells(p_W[0], 0);
+    const auto [y, fy] = cells(p_W[1], 1);
+    const auto [z, fz] = cells(p_W[2], 2);
+    const Int8 node = (z * count_[1] + y) * count_[0] + x;
+    std::array<Float8, 8> faces;
+    for (int i = 0; i < 8; ++i) {
+      faces[static_cast<std::size_t>(i)] =
+          between(static_cast<std::size_t>(node[i]), fx[i], fy[i], fz[i]);
+    }
+    const Int8 of_lane{0, 8, 16, 24, 32, 40, 48, 56};
+    const auto* from = reinterpret_cast<const float*>(faces.data());
+    std::array<Float8, 3> near, far;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Int8 first = of_lane + static_cast<std::int32_t>(2 * i);
+      const Int8 side = n[i] > 0 ? Int8{} : Int8{} + 1;
+      const Float8 weight = n[i] * n[i];
+      near[i] = weight * gather(from, first + side);
+      far[i] = weight * gather(from, first + (side ^ 1));
+    }
+    return {(near[0] + near[1]) + near[2], (far[0] + far[1]) + far[2]};
   }
   /// Of a surface: illuminance, lx.
   static float sum(const Float8& faces, const Float8& surface) {
@@ -65,6 +94,32 @@ class LightGrid {
     const float x = std::min(most, std::max(0.0F, (p - origin_[axis]) * per_m_));
     const auto index = static_cast<std::size_t>(static_cast<int>(x));
     return {index, x - static_cast<float>(index)};
+  }
+  struct Cells {
+    Int8 index;
+    Float8 fraction;
+  };
+  [[nodiscard]] Cells cells(const Float8& p, std::size_t axis) const {
+    const Float8 zero{}, most = zero + (static_cast<float>(count_[axis]) - 1.001F);
+    const Float8 from_origin = (p - origin_[axis]) * per_m_;
+    const Float8 inside = zero < from_origin ? from_origin : zero;
+    const Float8 x = inside < most ? inside : most;
+    const Int8 index = __builtin_convertvector(x, Int8);
+    return {index, x - __builtin_convertvector(index, Float8)};
+  }
+  [[nodiscard]] std::size_t row() const { return static_cast<std::size_t>(count_[0]); }
+  [[nodiscard]] std::size_t rows() const { return static_cast<std::size_t>(count_[1]); }
+  /// Between the eight nodes from number `index` on, at fractions of a cell.
+  [[nodiscard]] Float8 between(std::size_t index, float fx, float fy, float fz) const {
+    const Float8* node = &faces_[index];
+    const std::size_t layer = row() * rows();
+    const auto along_x = [fx](const Float8* n) { return n[0] + fx * (n[1] - n[0]); };
+    const auto along_y = [&](const Float8* n) {
+      const Float8 near = along_x(n);
+      return near + fy * (along_x(n + row()) - near);
+    };
+    const Float8 low = along_y(node);
+    return low + fz * (along_y(node + layer) - low);
   }
   void place_nodes(const InfraredLightConfig& light, const worlds::World& world);
   [[nodiscard]] Vec3 node(std::size_t index) const;

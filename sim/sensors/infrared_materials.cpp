@@ -97,17 +97,16 @@ SurfaceFacet facet_of(const worlds::World& world, std::size_t i, const Material&
   SurfaceFacet facet;
   const Vec3 normal = cross.norm() > 0 ? Vec3(cross.normalized()) : Vec3::UnitZ();
   facet.normal_W = normal.cast<float>();
-  facet.weights = LightGrid::weights(facet.normal_W);
   facet.key = static_cast<std::uint32_t>(mix_bits(object + 1));
   // Quads are drawn as two triangles, one behind the other.
   const float piece = 1 + material.spread * signed_unit(object + 0x1000000000ULL) +
                       material.facet_spread * signed_unit(i / 2 + 0x2000000000ULL);
   facet.albedo = std::min(world.objects[object].reflectivity, kMostAlbedo) * piece;
-  facet.material = static_cast<std::uint8_t>(world.objects[object].surface_class);
   const Vec3 n = normal.cwiseAbs();
   const bool level = n.z() >= n.x() && n.z() >= n.y();
-  facet.first_axis = level || n.y() >= n.x() ? 0 : 1;
-  facet.second_axis = level ? 1 : 2;
+  facet.traits =
+      static_cast<std::uint32_t>(world.objects[object].surface_class) << SurfaceFacet::kMaterial |
+      (level || n.y() >= n.x() ? 0 : SurfaceFacet::kAlongY) | (level ? 0 : SurfaceFacet::kUpright);
   return facet;
 }
 
@@ -136,6 +135,7 @@ InfraredSurfaces::InfraredSurfaces(const worlds::World& world, const std::vector
     if (lamp.object != Hit::kNone) glows_below[lamp.object] = lamp.glow_below_m;
   }
   facets_.reserve(world.mesh.triangles.size());
+  kinds_.reserve(world.mesh.triangles.size());
   for (std::size_t i = 0; i < world.mesh.triangles.size(); ++i) {
     const std::uint32_t object = world.mesh.object_of_triangle[i];
     const auto surface_class = static_cast<std::size_t>(world.objects[object].surface_class);
@@ -144,11 +144,14 @@ InfraredSurfaces::InfraredSurfaces(const worlds::World& world, const std::vector
     const auto& [a, b, c] = world.mesh.triangles[i];
     const std::array<Vec3f, 3> corners{world.mesh.vertices[a], world.mesh.vertices[b],
                                        world.mesh.vertices[c]};
-    facet.glows = std::max({corners[0].z(), corners[1].z(), corners[2].z()}) <= glows_below[object];
-    facet.small = (corners[1] - corners[0]).norm() < kSmall &&
-                  (corners[2] - corners[1]).norm() < kSmall &&
-                  (corners[0] - corners[2]).norm() < kSmall;
-    if (!facet.small) continue;
+    const bool glows =
+        std::max({corners[0].z(), corners[1].z(), corners[2].z()}) <= glows_below[object];
+    const bool small = (corners[1] - corners[0]).norm() < kSmall &&
+                       (corners[2] - corners[1]).norm() < kSmall &&
+                       (corners[0] - corners[2]).norm() < kSmall;
+    facet.traits |= (glows ? SurfaceFacet::kGlows : 0) | (small ? SurfaceFacet::kSmall : 0);
+    kinds_.push_back(static_cast<std::uint8_t>(2 * surface_class + (glows || small ? 1 : 0)));
+    if (!small) continue;
     const Material& material = materials_[surface_class];
     facet.front = light_sent(facet, material, facet.normal_W, corners, grid, sun, sun_lx);
     facet.back = light_sent(facet, material, -facet.normal_W, corners, grid, sun, sun_lx);

@@ -34,19 +34,29 @@ struct Material {
 Material noise_material(const std::array<float, Material::kOctaves>& wave_m,
                         const std::array<float, Material::kOctaves>& amplitude, float stretch = 1);
 
-/// What is known of a triangle before anybody looks at it; one cache line.
-struct alignas(64) SurfaceFacet {
-  Float8 weights;  ///< of its normal, for LightGrid; of the other side: pairs swapped
+/// What is known of a triangle before anybody looks at it; half a cache line, eight numbers wide.
+struct alignas(32) SurfaceFacet {
+  // Traits; what stands above them is the number of the material.
+  static constexpr std::uint32_t kAlongY = 1;   ///< the texture's first axis is W's y, not x
+  static constexpr std::uint32_t kUpright = 2;  ///< and its second one z, not y
+  static constexpr std::uint32_t kGlows = 4;    ///< a lamp
+  static constexpr std::uint32_t kSmall = 8;    ///< all of it is lit as `front` and `back` say
+  static constexpr unsigned kMaterial = 8;
+
   Vec3f normal_W;  ///< unit
   float albedo = 0;
   std::uint32_t key = 0;  ///< of its object's texture
-  std::uint8_t material = 0;
-  std::uint8_t first_axis = 0, second_axis = 1;  ///< of W, that its texture lies along
-  bool glows = false;                            ///< a lamp
-  bool small = false;  ///< all of it is lit alike, as `front` and `back` say
   // Light that it sends on, without its texture, on the side of its normal and on the other, lx.
   float front = 0, back = 0;
+  std::uint32_t traits = 0;
+
+  [[nodiscard]] bool glows() const { return (traits & kGlows) != 0; }
+  [[nodiscard]] bool small() const { return (traits & kSmall) != 0; }
+  [[nodiscard]] std::size_t material() const { return traits >> kMaterial; }
+  [[nodiscard]] std::size_t first_axis() const { return (traits & kAlongY) != 0 ? 1 : 0; }
+  [[nodiscard]] std::size_t second_axis() const { return (traits & kUpright) != 0 ? 2 : 1; }
 };
+static_assert(sizeof(SurfaceFacet) == sizeof(Float8));
 
 /// A world's surfaces as an infrared camera sees them. The light of what is small is computed once:
 /// leaves and twigs are most of what is drawn.
@@ -60,11 +70,20 @@ class InfraredSurfaces {
     return facets_[triangle];
   }
   [[nodiscard]] const Material& material(const SurfaceFacet& facet) const {
-    return materials_[facet.material];
+    return materials_[facet.material()];
+  }
+  /// Of what is shaded alike: material by material, first those that light falls on from place to
+  /// place, then those that are lit alike all over.
+  [[nodiscard]] std::size_t kinds() const { return 2 * materials_.size(); }
+  [[nodiscard]] std::uint8_t kind(std::uint32_t triangle) const { return kinds_[triangle]; }
+  static bool is_lit_alike(std::size_t kind) { return kind % 2 != 0; }
+  [[nodiscard]] const Material& material_of_kind(std::size_t kind) const {
+    return materials_[kind / 2];
   }
 
  private:
   std::vector<SurfaceFacet> facets_;
+  std::vector<std::uint8_t> kinds_;
   std::vector<Material> materials_;  ///< by class
 };
 
@@ -78,7 +97,8 @@ inline Uint8 lattice_hash(Uint8 h) {
 }
 
 /// Whether a texture shows where a pixel covers `footprint_m`.
-inline bool texture_shows(const Material& material, float footprint_m) {
+template <class Number>
+auto texture_shows(const Material& material, const Number& footprint_m) {
   constexpr float kNone = 1.5;
   return 2 * material.cell_m[0] >= kNone * footprint_m;
 }
@@ -122,42 +142,10 @@ inline float texture_at(const Material& material, std::uint32_t key, float a, fl
   return std::max(relative, 0.05F);
 }
 
-/// What eight places know of their materials.
-struct OneMaterial {
-  const Material& material;
-  [[nodiscard]] float cell_m(std::size_t k) const { return material.cell_m[k]; }
-  [[nodiscard]] float cells_per_m(std::size_t k) const {
-    return material.cells_per_m[static_cast<int>(k)];
-  }
-  [[nodiscard]] float amplitude(std::size_t k) const { return material.amplitude[k]; }
-  [[nodiscard]] float stretch() const { return material.stretch; }
-};
-struct EightMaterials {
-  const std::array<const Material*, 8>& materials;
-  template <class Member>
-  [[nodiscard]] Float8 each(const Member& member) const {
-    return Float8{member(*materials[0]), member(*materials[1]), member(*materials[2]),
-                  member(*materials[3]), member(*materials[4]), member(*materials[5]),
-                  member(*materials[6]), member(*materials[7])};
-  }
-  [[nodiscard]] Float8 cell_m(std::size_t k) const {
-    return each([k](const Material& m) { return m.cell_m[k]; });
-  }
-  [[nodiscard]] Float8 cells_per_m(std::size_t k) const {
-    return each([k](const Material& m) { return m.cells_per_m[static_cast<int>(k)]; });
-  }
-  [[nodiscard]] Float8 amplitude(std::size_t k) const {
-    return each([k](const Material& m) { return m.amplitude[k]; });
-  }
-  [[nodiscard]] Float8 stretch() const {
-    return each([](const Material& m) { return m.stretch; });
-  }
-};
-
-/// texture_at() at eight places at once. @param key one, or one each
-template <class Materials, class Key>
-Float8 texture_at_eight(const Materials& materials, const Key& key, const Float8& a,
-                        const Float8& b, const Float8& footprint_m) {
+/// The same at eight places at once. @param key one, or one each
+template <class Key>
+Float8 texture_at(const Material& material, const Key& key, const Float8& a, const Float8& b,
+                  const Float8& footprint_m) {
   constexpr float kFull = 3, kNone = 1.5;
   constexpr std::array<std::uint32_t, Material::kOctaves> kOctave{0x9E3779B9U, 0x3C6EF372U,
                                                                   0xDAA66D2BU, 0x78DDE6E4U};
@@ -172,12 +160,12 @@ Float8 texture_at_eight(const Materials& materials, const Key& key, const Float8
   const Float8 zero{}, one = zero + 1.0F;
   Float8 relative = one;
   for (std::size_t k = 0; k < Material::kOctaves; ++k) {
-    const auto cell = materials.cell_m(k);
+    const float cell = material.cell_m[k];
     if (!any(2 * cell >= kNone * footprint_m)) break;  // the finer ones do not show, either
     Float8 fade = (2 * cell / footprint_m - kNone) * (1 / (kFull - kNone));
     fade = fade < zero ? zero : fade > one ? one : fade;
-    const auto per_m = materials.cells_per_m(k);
-    const Float8 x = a * per_m, y = b * materials.stretch() * per_m;
+    const float per_m = material.cells_per_m[static_cast<int>(k)];
+    const Float8 x = a * per_m, y = b * material.stretch * per_m;
     const Int8 i = floor(x), j = floor(y);
     const Float8 s = smooth(x - __builtin_convertvector(i, Float8));
     const Float8 t = smooth(y - __builtin_convertvector(j, Float8));
@@ -189,22 +177,10 @@ Float8 texture_at_eight(const Materials& materials, const Key& key, const Float8
       return left + s * (grey(lattice_hash(column + 0x27D4EB2FU + line)) - left);
     };
     const Float8 low = along(row);
-    relative += materials.amplitude(k) * fade * (low + t * (along(above) - low));
+    relative += material.amplitude[k] * fade * (low + t * (along(above) - low));
   }
   const Float8 floor_of_it = zero + 0.05F;
   return relative < floor_of_it ? floor_of_it : relative;
-}
-
-/// The same at eight places of one surface, or of several of one material.
-template <class Key>
-Float8 texture_at(const Material& material, const Key& key, const Float8& a, const Float8& b,
-                  const Float8& footprint_m) {
-  return texture_at_eight(OneMaterial{material}, key, a, b, footprint_m);
-}
-/// And at eight places of as many surfaces.
-inline Float8 texture_at(const std::array<const Material*, 8>& materials, const Uint8& key,
-                         const Float8& a, const Float8& b, const Float8& footprint_m) {
-  return texture_at_eight(EightMaterials{materials}, key, a, b, footprint_m);
 }
 
 }  // namespace arex::sim

@@ -23,7 +23,8 @@ namespace arex::sim {
 /// Draws a world as an infrared camera sees it.
 ///
 /// The rasteriser finds the triangle of four samples in each pixel; what differs among them is
-/// shaded for itself, what is the same once, and eight pixels of one triangle at a time. A surface
+/// shaded for itself, what is the same once, and eight pixels of one triangle at a time; other
+/// pixels' surfaces eight of one kind at a time. A surface
 /// is its albedo with a procedural texture, under the sun where it shines, and under the baked
 /// light of sky, lamps and other surfaces. All of it is sums, products, quotients and square roots
 /// in a fixed order: the same bits on every host.
@@ -41,56 +42,80 @@ class InfraredShader {
   [[nodiscard]] const std::vector<Lamp>& lamps() const { return lamps_; }
   [[nodiscard]] const SunMap& sun() const { return sun_; }
   [[nodiscard]] const LightGrid& grid() const { return grid_; }
-  /// Triangles of the samples of the last picture, kSamples width * kSamples height.
-  [[nodiscard]] const std::vector<std::uint32_t>& triangles() const { return triangles_; }
   /// The pinhole of the samples.
   [[nodiscard]] const PinholeCamera& sample_camera() const { return fine_; }
 
  private:
   struct View {
     Vec3f eye_W;
-    Vec3f right_W, down_W;  ///< the image's axes, unit
+    Vec3f right_W, down_W, ahead_W;  ///< the camera's axes
   };
-  /// Surfaces that pixels of a row show and whose light is still to be found.
-  struct Queue {
-    std::vector<std::uint32_t> slot;  ///< where their light goes
-    std::vector<std::uint32_t> triangle;
-    std::array<std::vector<float>, 3> ray_W;  ///< of depth 1 in C
-    std::vector<float> inverse_depth;
+  /// Rows of pixels that are shaded together: the rows of samples lie in the cache meanwhile.
+  static constexpr int kBand = 2;
 
-    void add(std::uint32_t to, std::uint32_t of, const Vec3f& ray, float depth);
+  /// Surfaces of one kind that pixels of a band show and whose light is still to be found.
+  struct Queue {
+    static constexpr std::size_t kCapacity = 64;
+    std::size_t count = 0;
+    std::array<float*, kCapacity> to;  ///< where their light goes
+    std::array<std::uint32_t, kCapacity> triangle;
+    std::array<std::array<float, kCapacity>, 3> ray_W;  ///< of depth 1 in C
+    std::array<float, kCapacity> inverse_depth;
+
+    void add(float* light, std::uint32_t of, const Vec3f& ray, float depth) {
+      to[count] = light;
+      triangle[count] = of;
+      for (std::size_t k = 0; k < 3; ++k) ray_W[k][count] = ray[static_cast<Eigen::Index>(k)];
+      inverse_depth[count++] = depth;
+    }
     void fill_up();  ///< repeats the last until their number is one of eights
-    void clear();
+    [[nodiscard]] std::array<Float8, 3> rays(std::size_t first) const {
+      return {load_eight(&ray_W[0][first]), load_eight(&ray_W[1][first]),
+              load_eight(&ray_W[2][first])};
+    }
   };
-  /// What a pixel shows, and in how many of its samples; its light stands in four slots.
+  /// A pixel of several surfaces, and in how many of its samples it shows which.
   struct Mixture {
-    int surfaces = 0;
-    std::array<float, 4> samples{};
+    float* pixel;
+    std::size_t surfaces = 0;
+    std::array<float, 4> samples, light_lx;
   };
-  /// Where a facet shows the eye which side, under what light from sky, lamps and surfaces.
-  struct Side {
-    Vec3f normal_W;
-    Float8 near, far;  ///< weights of the side seen, and of the other
-    float sun_lx;      ///< where the sun reaches it
-  };
-  [[nodiscard]] Side side_of(const SurfaceFacet& facet, const Material& material,
-                             bool from_behind) const;
-  [[nodiscard]] float indirect(const Side& side, const Material& material, const Vec3f& p) const;
-  /// Whether all samples of eight pixels show one triangle, which is no backdrop.
-  [[nodiscard]] bool is_even(std::size_t first_sample) const;
-  void eight_pixels(const View& view, const Vec3f& row_W, int u, std::size_t first_sample,
-                    float* light, float* inverse_depth) const;
-  void split_pixel(const View& view, const Vec3f& row_W, int u, int v, float& inverse_depth);
-  [[nodiscard]] Float8 eight_surfaces(const View& view, std::size_t first) const;
-  void shade_queues(const View& view);
-  [[nodiscard]] float mixed(int u) const;
+  /// Facets of eight triangles.
+  struct EightFacets;
+
+  void draw_band(const View& view, int v_first, InfraredScene& out);
+  void draw_row(const View& view, int v, const float* depths, const std::uint32_t* triangles,
+                InfraredScene& out);
+  void eight_pixels(const View& view, std::size_t u, std::uint32_t triangle, const Float8& q,
+                    float* light) const;
+  void split_pixel(const View& view, const Vec3f& ray_W, const std::array<std::uint32_t, 4>& seen,
+                   const std::array<float, 4>& q, float* light);
+  /// Notes a surface. @param light where its light goes
+  void show(const View& view, std::uint32_t triangle, const Vec3f& ray_W, float inverse_depth,
+            float* light) {
+    std::size_t kind = backdrop_kind();
+    if (triangle != Renderer::kNoTriangle) {
+      kind = surfaces_.kind(triangle);
+      __builtin_prefetch(&surfaces_.facet(triangle));  // nobody can guess which comes next
+    }
+    queues_[kind].add(light, triangle, ray_W, inverse_depth);
+    if (queues_[kind].count == Queue::kCapacity) shade(view, kind);
+  }
+  [[nodiscard]] std::size_t backdrop_kind() const { return surfaces_.kinds(); }
+  void shade(const View& view, std::size_t kind);
+  /// Light of eight surfaces, from number `first` of a kind's queue on, as white ones', lx.
+  [[nodiscard]] Float8 eight_surfaces(const View& view, std::size_t kind, std::size_t first) const;
+  [[nodiscard]] Float8 lit_alike(const EightFacets& facets, const Int8& from_behind) const;
+  [[nodiscard]] Float8 lit_from_place_to_place(const Material& material, const EightFacets& facets,
+                                               const Int8& from_behind,
+                                               const std::array<Float8, 3>& p) const;
   /// What pixels cover of surfaces at depth z, m. @param squared of their rays' lengths
   [[nodiscard]] Float8 footprint_of(const Float8& z, const Float8& towards,
                                     const Float8& squared) const;
   static Float8 seam(const Float8& at, const Float8& spacing, const Float8& footprint);
-  /// What a point of a surface of unit normal n, of either side, is asked for the sun off it: more
-  /// than its slope makes of a texel of the map.
-  [[nodiscard]] Vec3f off_towards_sun(const Vec3f& n) const;
+  /// What a point of a surface is asked for the sun off it, along its normal on the side of the
+  /// sun, m: more than its slope makes of a texel of the map.
+  [[nodiscard]] float off_towards_sun() const { return static_cast<float>(2 * sun_.texel_m()); }
 
   PinholeCamera camera_, fine_;
   std::vector<Lamp> lamps_;
@@ -101,12 +126,13 @@ class InfraredShader {
   Backdrop backdrop_;
   Renderer renderer_;
   float lamp_lx_ = 0, pixel_rad_ = 0, off_surface_m_ = 0;
-  std::vector<float> column_x_;  ///< (u - cx) / fx
-  std::vector<float> fine_inverse_depth_;
-  std::vector<std::uint32_t> triangles_;
-  Queue surface_queue_, backdrop_queue_;
-  std::vector<Mixture> mixtures_;    ///< of a row's pixels
-  std::vector<float> scattered_lx_;  ///< four slots for each
+  std::vector<float> column_x_;                   ///< (u - cx) / fx
+  std::array<std::vector<float>, 3> row_rays_W_;  ///< of a row's pixels, of depth 1 in C
+  std::vector<float> band_inverse_depth_;         ///< of a band's samples
+  std::vector<std::uint32_t> band_triangles_;
+  std::vector<Queue> queues_;      ///< by kind, the last is the backdrop's
+  std::vector<Mixture> mixtures_;  ///< of a band
+  std::size_t mixed_ = 0;          ///< of them
 };
 
 }  // namespace arex::sim

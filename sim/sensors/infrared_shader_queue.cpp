@@ -4,7 +4,7 @@
 #include "sensors/infrared_shader.h"
 
 // Pixels at the edges of things, each of other surfaces than its neighbours: what they show is
-// collected along a row and shaded eight at a time.
+// collected by kind and shaded eight at a time.
 namespace arex::sim {
 namespace {
 
@@ -12,34 +12,38 @@ constexpr float kSeamWidth = 0.012F;  // m
 constexpr float kSeamDark = 0.35F;    // share of the light lost in it
 constexpr float kLeastSlant = 0.15F;  // cosine: surfaces seen more obliquely count as this
 
-Float8 load(const float* from) {
-  Float8 v;
-  std::memcpy(&v, from, sizeof v);
-  return v;
-}
-
 }  // namespace
 
-void InfraredShader::Queue::add(std::uint32_t to, std::uint32_t of, const Vec3f& ray, float depth) {
-  slot.push_back(to);
-  triangle.push_back(of);
-  for (std::size_t k = 0; k < 3; ++k) ray_W[k].push_back(ray[static_cast<Eigen::Index>(k)]);
-  inverse_depth.push_back(depth);
-}
+/// SurfaceFacet's members, each of eight.
+struct InfraredShader::EightFacets {
+  std::array<Float8, 3> normal_W;
+  Float8 albedo, front, back;
+  Uint8 key, traits;
+
+  EightFacets(const InfraredSurfaces& surfaces, const std::uint32_t* triangles) {
+    std::array<Float8, 8> rows;
+    for (std::size_t i = 0; i < 8; ++i) {
+      std::memcpy(&rows[i], &surfaces.facet(triangles[i]), sizeof rows[i]);
+    }
+    const std::array<Float8, 8> columns = transposed(rows);
+    normal_W = {columns[0], columns[1], columns[2]};
+    albedo = columns[3];
+    key = (Uint8)columns[4];
+    front = columns[5];
+    back = columns[6];
+    traits = (Uint8)columns[7];
+  }
+  /// -1 where it has one.
+  [[nodiscard]] Int8 has(std::uint32_t trait) const { return (Int8)((traits & trait) != 0); }
+};
 
 void InfraredShader::Queue::fill_up() {
-  while (slot.size() % 8 != 0) {
-    const std::size_t last = slot.size() - 1;
-    add(slot[last], triangle[last], Vec3f(ray_W[0][last], ray_W[1][last], ray_W[2][last]),
-        inverse_depth[last]);
+  for (; count % 8 != 0; ++count) {
+    to[count] = to[count - 1];
+    triangle[count] = triangle[count - 1];
+    for (std::array<float, kCapacity>& axis : ray_W) axis[count] = axis[count - 1];
+    inverse_depth[count] = inverse_depth[count - 1];
   }
-}
-
-void InfraredShader::Queue::clear() {
-  slot.clear();
-  triangle.clear();
-  for (std::vector<float>& axis : ray_W) axis.clear();
-  inverse_depth.clear();
 }
 
 Float8 InfraredShader::footprint_of(const Float8& z, const Float8& towards,
@@ -59,97 +63,79 @@ Float8 InfraredShader::seam(const Float8& at, const Float8& spacing, const Float
   return (off < 0 ? -off : off) < 0.5F * width ? one - kSeamDark * kSeamWidth / width : one;
 }
 
-Vec3f InfraredShader::off_towards_sun(const Vec3f& n) const {
-  constexpr double kTexels = 2;
-  const auto off = static_cast<float>(kTexels * sun_.texel_m());
-  return (n.dot(sun_.direction_W()) > 0 ? off : -off) * n;
+Float8 InfraredShader::lit_alike(const EightFacets& facets, const Int8& from_behind) const {
+  const Float8 lux = from_behind ? facets.back : facets.front;
+  return facets.has(SurfaceFacet::kGlows) ? lamp_lx_ - Float8{} : lux;
 }
 
-/// Light of eight surfaces, from number `first` of the queue on, as white ones', lx.
-Float8 InfraredShader::eight_surfaces(const View& view, std::size_t first) const {
-  const Queue& queue = surface_queue_;
-  const Float8 z = 1 / load(&queue.inverse_depth[first]);
-  std::array<Float8, 3> ray, p, normal;
-  std::array<const SurfaceFacet*, 8> facets{};
-  std::array<const Material*, 8> materials{};
-  for (std::size_t i = 0; i < 8; ++i) {
-    facets[i] = &surfaces_.facet(queue.triangle[first + i]);
-    materials[i] = &surfaces_.material(*facets[i]);
-    for (std::size_t k = 0; k < 3; ++k) {
-      normal[k][static_cast<int>(i)] = facets[i]->normal_W[static_cast<Eigen::Index>(k)];
-    }
-  }
+/// @param p their places in W
+Float8 InfraredShader::lit_from_place_to_place(const Material& material, const EightFacets& facets,
+                                               const Int8& from_behind,
+                                               const std::array<Float8, 3>& p) const {
+  std::array<Float8, 3> normal, off;
   for (std::size_t k = 0; k < 3; ++k) {
-    ray[k] = load(&queue.ray_W[k][first]);
+    normal[k] = from_behind ? -facets.normal_W[k] : facets.normal_W[k];
+    off[k] = p[k] + off_surface_m_ * normal[k];
+  }
+  const auto sides = grid_.sides(off, normal);
+  Float8 lux = sides.near;
+  if (material.translucency != 0) lux += material.translucency * sides.far;
+  const Vec3f& sun = sun_.direction_W();
+  const Float8 zero{};
+  const Float8 facing = normal[0] * sun.x() + (normal[1] * sun.y() + normal[2] * sun.z());
+  const Float8 sun_lx = sun_lx_ * (facing > 0 ? facing : -facing * material.translucency);
+  if (any(sun_lx > 0)) {
+    const Float8 off_m = facing > 0 ? zero + off_towards_sun() : zero - off_towards_sun();
+    for (std::size_t k = 0; k < 3; ++k) off[k] = p[k] + off_m * normal[k];
+    lux = sun_lx > 0 ? lux + sun_lx * sun_.visible(off) : lux;
+  }
+  return lux * facets.albedo;
+}
+
+Float8 InfraredShader::eight_surfaces(const View& view, std::size_t kind, std::size_t first) const {
+  const Queue& queue = queues_[kind];
+  const Material& material = surfaces_.material_of_kind(kind);
+  const EightFacets facets(surfaces_, &queue.triangle[first]);
+  const Float8 z = 1 / load_eight(&queue.inverse_depth[first]);
+  const std::array<Float8, 3> ray = queue.rays(first);
+  std::array<Float8, 3> p;
+  for (std::size_t k = 0; k < 3; ++k) {
     p[k] = view.eye_W[static_cast<Eigen::Index>(k)] + z * ray[k];
   }
+  const std::array<Float8, 3>& normal = facets.normal_W;
   const Float8 towards = normal[0] * ray[0] + (normal[1] * ray[1] + normal[2] * ray[2]);
+  const Int8 from_behind = towards > 0;
+  const bool alike = InfraredSurfaces::is_lit_alike(kind);
+  const Float8 lux = alike ? lit_alike(facets, from_behind)
+                           : lit_from_place_to_place(material, facets, from_behind, p);
+  Int8 plain{};  // -1: without texture
+  if (alike) {
+    plain = facets.has(SurfaceFacet::kGlows) | ~texture_shows(material, z * pixel_rad_);
+    if (!any(~plain)) return lux;
+  }
   const Float8 squared = ray[0] * ray[0] + (ray[1] * ray[1] + ray[2] * ray[2]);
   const Float8 footprint = footprint_of(z, towards, squared);
-  const Float8 zero{}, one = zero + 1.0F;
-  Float8 lux, albedo = one, sun_lx{}, a{}, b{}, seam_m{};
-  std::array<Float8, 3> lit = p;
-  Int8 plain{};  // -1: without texture
-  Uint8 keys;
-  for (int i = 0; i < 8; ++i) {
-    const auto lane = static_cast<std::size_t>(i);
-    const SurfaceFacet& facet = *facets[lane];
-    const Material& material = *materials[lane];
-    const bool from_behind = towards[i] > 0;
-    keys[i] = facet.key;
-    a[i] = p[facet.first_axis][i];
-    b[i] = p[facet.second_axis][i];
-    if (facet.glows) {
-      lux[i] = lamp_lx_;
-      plain[i] = -1;
-    } else if (facet.small) {
-      lux[i] = from_behind ? facet.back : facet.front;
-      plain[i] = texture_shows(material, z[i] * pixel_rad_) ? 0 : -1;
-      seam_m[i] = material.seam_m;
-    } else {
-      const Side side = side_of(facet, material, from_behind);
-      lux[i] = indirect(side, material, Vec3f(p[0][i], p[1][i], p[2][i]));
-      albedo[i] = facet.albedo;
-      seam_m[i] = material.seam_m;
-      if (!(side.sun_lx > 0)) continue;
-      sun_lx[i] = side.sun_lx;
-      const Vec3f off = off_towards_sun(side.normal_W);
-      for (std::size_t k = 0; k < 3; ++k) lit[k][i] += off[static_cast<Eigen::Index>(k)];
-    }
+  const Float8 a = facets.has(SurfaceFacet::kAlongY) ? p[1] : p[0];
+  const Float8 b = facets.has(SurfaceFacet::kUpright) ? p[2] : p[1];
+  Float8 relative = texture_at(material, facets.key, a, b, footprint);
+  if (material.seam_m > 0) {
+    const Float8 spacing = material.seam_m - Float8{};
+    relative *= seam(a, spacing, footprint) * seam(b, spacing, footprint);
   }
-  if (any(sun_lx > 0)) lux = sun_lx > 0 ? lux + sun_lx * sun_.visible(lit) : lux;
-  lux *= albedo;
-  if (!any(plain == 0)) return lux;
-  Float8 relative = texture_at(materials, keys, a, b, footprint);
-  if (any(seam_m > 0)) {
-    const Float8 spacing = seam_m > 0 ? seam_m : one;
-    const Float8 dark = seam(a, spacing, footprint) * seam(b, spacing, footprint);
-    relative = seam_m > 0 ? relative * dark : relative;
-  }
-  return plain == 0 ? lux * relative : lux;
+  return plain ? lux : lux * relative;
 }
 
-void InfraredShader::shade_queues(const View& view) {
-  surface_queue_.fill_up();
-  for (std::size_t first = 0; first < surface_queue_.slot.size(); first += 8) {
-    const Float8 light = eight_surfaces(view, first);
-    for (int i = 0; i < 8; ++i) {
-      scattered_lx_[surface_queue_.slot[first + static_cast<std::size_t>(i)]] = light[i];
-    }
+/// Finds the light of what is collected of a kind.
+void InfraredShader::shade(const View& view, std::size_t kind) {
+  Queue& queue = queues_[kind];
+  queue.fill_up();
+  for (std::size_t first = 0; first < queue.count; first += 8) {
+    const Float8 light = kind == backdrop_kind()
+                             ? backdrop_.at(view.eye_W, queue.rays(first), pixel_rad_)
+                             : eight_surfaces(view, kind, first);
+    for (int i = 0; i < 8; ++i) *queue.to[first + static_cast<std::size_t>(i)] = light[i];
   }
-  surface_queue_.clear();
-  backdrop_queue_.fill_up();
-  for (std::size_t first = 0; first < backdrop_queue_.slot.size(); first += 8) {
-    const Float8 light = backdrop_.at(
-        view.eye_W,
-        {load(&backdrop_queue_.ray_W[0][first]), load(&backdrop_queue_.ray_W[1][first]),
-         load(&backdrop_queue_.ray_W[2][first])},
-        pixel_rad_);
-    for (int i = 0; i < 8; ++i) {
-      scattered_lx_[backdrop_queue_.slot[first + static_cast<std::size_t>(i)]] = light[i];
-    }
-  }
-  backdrop_queue_.clear();
+  queue.count = 0;
 }
 
 }  // namespace arex::sim

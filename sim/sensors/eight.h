@@ -36,6 +36,23 @@ inline Float8 gather(const float* from, const Int8& index) {
                 from[index[4]], from[index[5]], from[index[6]], from[index[7]]};
 }
 
+/// from[index] and from[index + 1], each: fetched in pairs.
+struct Neighbours {
+  Float8 left, right;
+};
+inline Neighbours gather_neighbours(const float* from, const Int8& index) {
+  using Pairs = double __attribute__((vector_size(32)));
+  const auto pair = [&](int i) {
+    double both;
+    std::memcpy(&both, from + index[i], sizeof both);
+    return both;
+  };
+  const auto outer = (Float8)Pairs{pair(0), pair(1), pair(4), pair(5)};
+  const auto inner = (Float8)Pairs{pair(2), pair(3), pair(6), pair(7)};
+  return {__builtin_shufflevector(outer, inner, 0, 2, 8, 10, 4, 6, 12, 14),
+          __builtin_shufflevector(outer, inner, 1, 3, 9, 11, 5, 7, 13, 15)};
+}
+
 inline Float8 root(const Float8& v) {
   Float8 out;
   for (int i = 0; i < 8; ++i) out[i] = std::sqrt(v[i]);

@@ -141,10 +141,10 @@ Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int
     const Float8 a = cu - __builtin_convertvector(column, Float8);
     const Float8 b = cv - __builtin_convertvector(row, Float8);
     const Int8 at = row * camera_.width + column;
-    const Float8 left = gather(in.data(), at), right = gather(in.data() + 1, at);
-    const Float8 below_left = gather(next_row, at), below_right = gather(next_row + 1, at);
-    const Float8 upper = left + a * (right - left);
-    const Float8 lower = below_left + a * (below_right - below_left);
+    const Neighbours here = gather_neighbours(in.data(), at);
+    const Neighbours below = gather_neighbours(next_row, at);
+    const Float8 upper = here.left + a * (here.right - here.left);
+    const Float8 lower = below.left + a * (below.right - below.left);
     sum += k < taps ? upper + b * (lower - upper) : zero;
   }
   return sum * step;

@@ -36,11 +36,11 @@ class SunMap {
   /// The same of eight points, by their coordinates.
   [[nodiscard]] Float8 visible(const std::array<Float8, 3>& p_W) const {
     const std::array<Float8, 3> d{p_W[0] - eye_.x(), p_W[1] - eye_.y(), p_W[2] - eye_.z()};
-    const auto along = [&](int i) {
+    const auto in_S = [&](int i) {
       return axes_(i, 0) * d[0] + (axes_(i, 1) * d[1] + axes_(i, 2) * d[2]) + lift_[i];
     };
-    const Float8 q = 1 / along(2);
-    const Float8 u = fx_ * along(0) * q + cx_, v = fx_ * along(1) * q + cy_;
+    const Float8 q = 1 / in_S(2);
+    const Float8 u = fx_ * in_S(0) * q + cx_, v = fx_ * in_S(1) * q + cy_;
     const Float8 zero{}, one = zero + 1.0F;
     const Int8 inside = (u >= zero) & (v >= zero) & (u < last_u_) & (v < last_v_);
     const Int8 column = __builtin_convertvector(inside ? u : zero, Int8);
@@ -48,11 +48,14 @@ class SunMap {
     const Float8 du = u - __builtin_convertvector(column, Float8);
     const Float8 dv = v - __builtin_convertvector(row, Float8);
     const Int8 at = row * width_ + column;
-    const auto lit = [&](const float* from) { return gather(from, at) > q ? zero : one; };
-    const float *above = inverse_depth_.data(), *below = above + width_;
-    const Float8 above_left = lit(above), below_left = lit(below);
-    const Float8 upper = above_left + du * (lit(above + 1) - above_left);
-    const Float8 lower = below_left + du * (lit(below + 1) - below_left);
+    const auto lit = [&](const Float8& nearest) { return nearest > q ? zero : one; };
+    const auto along = [&](const float* texels) {
+      const Neighbours nearest = gather_neighbours(texels, at);
+      const Float8 left = lit(nearest.left);
+      return left + du * (lit(nearest.right) - left);
+    };
+    const Float8 upper = along(inverse_depth_.data());
+    const Float8 lower = along(inverse_depth_.data() + width_);
     return inside ? upper + dv * (lower - upper) : one;
   }
   /// Towards the sun, in W, unit.

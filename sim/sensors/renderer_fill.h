@@ -64,7 +64,7 @@ struct Footprint {
 ///
 /// It is made of tiles of 4 x 4 pixels: a leaf's lie in one place of the memory or two, where a row
 /// of depths and one of triangles would be two for each row that it covers. Tiles that a triangle
-/// misses, or that are nearer all over, are told by their corners, four of them at a time.
+/// misses, or that are nearer all over, are told by their corners, a block of sixteen at a time.
 template <bool with_triangles>
 class TiledPicture {
  public:
@@ -92,7 +92,7 @@ class TiledPicture {
   /// Nothing is drawn yet.
   void clear() {
     tiles_.resize(columns_ * rows_);
-    least_.assign(tiles_.size() + kLanes, kUntouched);
+    least_.assign(tiles_.size() + kLanes * (columns_ + 1), kUntouched);
   }
 
   /// Draws a triangle where it covers a pixel's centre within the box and nothing drawn is as near.
@@ -107,10 +107,10 @@ class TiledPicture {
          footprint.of_one[3]);
     const bool wide = box.u_last - box.u_first >= kWide;
     if (nearest <= most) {
-      wide ? fill_rows<true, false>(footprint, box, most, triangle)
-           : fill_rows<false, false>(footprint, box, most, triangle);
+      wide ? fill_blocks<true, false>(footprint, box, most, triangle)
+           : fill_blocks<false, false>(footprint, box, most, triangle);
     } else {
-      fill_rows<true, true>(footprint, box, most, triangle);
+      fill_blocks<true, true>(footprint, box, most, triangle);
     }
   }
 
@@ -135,7 +135,7 @@ class TiledPicture {
   static constexpr int kPixels = kSide * kSide;
   // From this width on, the run of tiles between the edges is worth looking for, px.
   static constexpr int kWide = 16;
-  static constexpr float kUntouched = -1;
+  static constexpr double kUntouched = -1;
 
   struct alignas(64) DepthTile {
     std::array<float, kPixels> inverse_depth{};  ///< 1/z so far, rows from the top
@@ -146,28 +146,42 @@ class TiledPicture {
   };
   using Tile = std::conditional_t<with_triangles, TriangleTile, DepthTile>;
 
-  /// The functions of a footprint in four rows or tiles: [function][row].
+  /// Each function of a footprint at four places, in the registers and in the memory.
+  using Values = std::array<Double4, Footprint::kFunctions>;
   using Rows = std::array<std::array<double, kLanes>, Footprint::kFunctions>;
+  /// Where each function is taken in tiles: at their first or last columns or rows.
+  using Places = std::array<const double*, Footprint::kFunctions>;
 
-  /// Each function at x = 0 in four rows of given y.
-  static void find_rows(const Footprint& footprint, const std::array<const double*, 4>& y,
-                        Rows& rows) {
-    for (std::size_t i = 0; i < Footprint::kFunctions; ++i) {
-      const auto lane = static_cast<int>(i);
-      const Double4 along =
-          footprint.of_y[lane] * load_vector<Double4>(y[i]) + footprint.of_one[lane];
-      std::memcpy(rows[i].data(), &along, sizeof along);
+  static Values along_x(const Footprint& footprint, const Places& x, std::size_t column) {
+    Values values;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = footprint.of_x[static_cast<int>(i)] * load_vector<Double4>(x[i] + column);
     }
+    return values;
+  }
+  static Rows along_y(const Footprint& footprint, const Places& y, std::size_t row) {
+    Rows rows;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto lane = static_cast<int>(i);
+      const Double4 values =
+          footprint.of_y[lane] * load_vector<Double4>(y[i] + row) + footprint.of_one[lane];
+      std::memcpy(rows[i].data(), &values, sizeof values);
+    }
+    return rows;
+  }
+  /// In which of four tiles of row k of a block an edge is negative.
+  static Long4 outside(const Values& x, const Rows& y, std::size_t k) {
+    return (Long4)(x[0] + y[0][k]) | (Long4)(x[1] + y[1][k]) | (Long4)(x[2] + y[2][k]);
   }
 
+  /// Draws in blocks of 4 x 4 tiles.
   template <bool wide, bool cut_near>
-  void fill_rows(const Footprint& footprint, const PixelBox& box, double most,
-                 std::uint32_t triangle) {
-    const Double4 zero{};
+  void fill_blocks(const Footprint& footprint, const PixelBox& box, double most,
+                   std::uint32_t triangle) {
     const unsigned falls_right = lanes_of((Long4)footprint.of_x);
     const unsigned falls_down = lanes_of((Long4)footprint.of_y);
     // Where each function is greatest in tiles, and least.
-    std::array<const double*, 4> x_most, x_least, y_most, y_least;
+    Places x_most, x_least, y_most, y_least;
     for (std::size_t i = 0; i < 4; ++i) {
       const unsigned left = falls_right >> i & 1U, top = falls_down >> i & 1U;
       x_most[i] = border_x_[1 - left].data();
@@ -175,124 +189,107 @@ class TiledPicture {
       x_least[i] = border_x_[left].data();
       y_least[i] = border_y_[top].data();
     }
-    const auto first_row = static_cast<std::size_t>(box.v_first / kSide);
     const auto last_row = static_cast<std::size_t>(box.v_last / kSide);
-    const Double4 roots = wide ? -1.0 / footprint.of_x : zero;  // zero at x = root * (value at 0)
-    Rows greatest, smallest, rows;
-    for (std::size_t row = first_row; row <= last_row; ++row) {
-      const std::size_t k = (row - first_row) % kLanes;
-      if (k == 0) {
-        find_rows(footprint, {y_most[0] + row, y_most[1] + row, y_most[2] + row, y_most[3] + row},
-                  greatest);
-        if (wide) {
-          find_rows(footprint,
-                    {y_least[0] + row, y_least[1] + row, y_least[2] + row, y_least[3] + row},
-                    smallest);
-        }
-      }
+    const Double4 roots = wide ? -1.0 / footprint.of_x : Double4{};  // zero at root * (value at 0)
+    for (auto row = static_cast<std::size_t>(box.v_first / kSide); row <= last_row; row += kLanes) {
+      const Rows y = along_y(footprint, y_most, row);
       double u_first = box.u_first, u_last = box.u_last;
       if constexpr (wide) {
         // A pixel of slack on both sides: the tiles' corners decide.
         for (int i = 0; i < 3; ++i) {
-          const double at_centre = greatest[static_cast<std::size_t>(i)][k];
-          const double u = camera_.cx + camera_.fx * (at_centre * roots[i]);
+          const std::array<double, kLanes>& values = y[static_cast<std::size_t>(i)];
+          const double greatest = std::max(values[0], values[3]);
+          const double u = camera_.cx + camera_.fx * (greatest * roots[i]);
           if (footprint.of_x[i] > 0) u_first = std::max(u_first, u - 1);
           if (footprint.of_x[i] < 0) u_last = std::min(u_last, u + 1);
-          if (footprint.of_x[i] == 0 && at_centre < 0) u_last = u_first - 1;
+          if (footprint.of_x[i] == 0 && greatest < 0) u_last = u_first - 1;
         }
         if (u_first > u_last) continue;
       }
+      const auto first_column = static_cast<std::size_t>(static_cast<int>(u_first) / kSide);
       const auto last_column = static_cast<std::size_t>(static_cast<int>(u_last) / kSide);
-      bool rows_found = false;
-      for (auto column = static_cast<std::size_t>(static_cast<int>(u_first) / kSide);
-           column <= last_column; column += kLanes) {
-        const std::size_t tile = row * columns_ + column;
-        const auto function = [&](std::size_t i, const std::array<const double*, 4>& x,
-                                  const Rows& row_values) {
-          return footprint.of_x[static_cast<int>(i)] * load_vector<Double4>(x[i] + column) +
-                 row_values[i][k];
-        };
-        const auto negative = [&](const std::array<const double*, 4>& x, const Rows& row_values) {
-          return (Long4)function(0, x, row_values) | (Long4)function(1, x, row_values) |
-                 (Long4)function(2, x, row_values);
-        };
-        const auto least = __builtin_convertvector(load_vector<Float4>(&least_[tile]), Double4);
-        const Long4 hidden = function(3, x_most, greatest) < least;
-        unsigned live = ~lanes_of(negative(x_most, greatest) | hidden) & 0b1111U;
-        live &= 0b1111U >> (kLanes - std::min<std::size_t>(last_column - column + 1, kLanes));
-        if (live == 0) continue;
-        if (!rows_found) {
-          find_pixel_rows(footprint, row, box, rows);
-          rows_found = true;
+      const unsigned live_rows = first_of_sixteen(kLanes * (last_row - row + 1));
+      Rows y_worst;
+      if constexpr (wide) y_worst = along_y(footprint, y_least, row);
+      for (std::size_t column = first_column; column <= last_column; column += kLanes) {
+        const Values x = along_x(footprint, x_most, column);
+        unsigned dead = 0, inside = 0;
+        const double* least = &least_[row * columns_ + column];
+        for (std::size_t k = 0; k < kLanes; ++k, least += columns_) {
+          const Long4 hidden = x[3] + y[3][k] < load_vector<Double4>(least);
+          dead |= lanes_of(outside(x, y, k) | hidden) << (kLanes * k);
         }
-        unsigned inside = 0;
-        if constexpr (wide) inside = ~lanes_of(negative(x_least, smallest)) & 0b1111U;
+        const unsigned live_columns = first_of_sixteen(last_column - column + 1) & 0b1111U;
+        unsigned live = ~dead & live_rows & (0x1111U * live_columns);
+        if (live == 0) continue;
+        if constexpr (wide) {
+          const Values x_worst = along_x(footprint, x_least, column);
+          for (std::size_t k = 0; k < kLanes; ++k) {
+            inside |= (lanes_of(outside(x_worst, y_worst, k)) ^ 0b1111U) << (kLanes * k);
+          }
+        }
         for (; live != 0; live &= live - 1) {
-          const auto lane = static_cast<std::size_t>(__builtin_ctz(live));
-          const std::size_t u = (column + lane) * kSide;
-          if (wide && (inside >> lane & 1U) != 0) {
-            fill_tile<true, cut_near>(footprint, rows, u, most, triangle, tile + lane);
+          const auto tile = static_cast<std::size_t>(__builtin_ctz(live));
+          const std::size_t tile_row = row + tile / kLanes, tile_column = column + tile % kLanes;
+          if (wide && (inside >> tile & 1U) != 0) {
+            fill_tile<true, cut_near>(footprint, tile_row, tile_column, box, most, triangle);
           } else {
-            fill_tile<false, cut_near>(footprint, rows, u, most, triangle, tile + lane);
+            fill_tile<false, cut_near>(footprint, tile_row, tile_column, box, most, triangle);
           }
         }
       }
     }
   }
 
-  /// The rows of one row of tiles; of those outside of the box 1/z is less than any.
-  void find_pixel_rows(const Footprint& footprint, std::size_t row, const PixelBox& box,
-                       Rows& rows) const {
-    const double* y = &ray_y_[row * kSide];
-    find_rows(footprint, {y, y, y, y}, rows);
-    double* q = rows[Footprint::kInverseDepth].data();
-    const Long4 v = Long4{0, 1, 2, 3} + static_cast<std::int64_t>(row * kSide);
-    const Double4 in_box = (v >= box.v_first) & (v <= box.v_last)
-                               ? load_vector<Double4>(q)
-                               : all_lanes(-std::numeric_limits<double>::infinity());
-    std::memcpy(q, &in_box, sizeof in_box);
+  /// As many bits, all sixteen from there on.
+  static unsigned first_of_sixteen(std::size_t count) {
+    return count < 16 ? (1U << count) - 1U : 0xFFFFU;
   }
 
   template <bool inside, bool cut_near>
-  void fill_tile(const Footprint& footprint, const Rows& rows, std::size_t u, double most,
-                 std::uint32_t triangle, std::size_t at) {
-    const auto x = load_vector<Double4>(&ray_x_[u]);
-    const Double4 x0 = footprint.of_x[0] * x, x1 = footprint.of_x[1] * x;
-    const Double4 x2 = footprint.of_x[2] * x, x3 = footprint.of_x[3] * x;
-    const auto drawn = [&](std::size_t row) {
-      Double4 q = x3 + rows[3][row];
+  void fill_tile(const Footprint& footprint, std::size_t row, std::size_t column,
+                 const PixelBox& box, double most, std::uint32_t triangle) {
+    const double* ray_y = &ray_y_[row * kSide];
+    Rows y = along_y(footprint, {ray_y, ray_y, ray_y, ray_y}, 0);
+    // Outside of the box 1/z is less than any.
+    const auto row_y = load_vector<Double4>(ray_y);
+    const Long4 in_box = (row_y >= ray_y_[static_cast<std::size_t>(box.v_first)]) &
+                         (row_y <= ray_y_[static_cast<std::size_t>(box.v_last)]);
+    const Double4 q_in_box = in_box ? load_vector<Double4>(y[3].data())
+                                    : all_lanes(-std::numeric_limits<double>::infinity());
+    std::memcpy(y[3].data(), &q_in_box, sizeof q_in_box);
+    const double* ray_x = &ray_x_[column * kSide];
+    const Values x = along_x(footprint, {ray_x, ray_x, ray_x, ray_x}, 0);
+    const auto drawn = [&](std::size_t k) {
+      Double4 q = x[3] + y[3][k];
       if constexpr (cut_near) q = q <= most ? q : Double4{};
-      if constexpr (!inside) {
-        const Long4 negative =
-            (Long4)(x0 + rows[0][row]) | (Long4)(x1 + rows[1][row]) | (Long4)(x2 + rows[2][row]);
-        q = negative < 0 ? Double4{} : q;
-      }
+      if constexpr (!inside) q = outside(x, y, k) < 0 ? Double4{} : q;
       return __builtin_convertvector(q, Float4);
     };
+    const std::size_t at = row * columns_ + column;
     Tile& tile = tiles_[at];
     const Int8 touched = Int8{} - (least_[at] != kUntouched ? 1 : 0);
     Float8 least;
-    for (std::size_t row = 0; row < kSide; row += 2) {
-      const Float8 two =
-          __builtin_shufflevector(drawn(row), drawn(row + 1), 0, 1, 2, 3, 4, 5, 6, 7);
-      float* so_far = &tile.inverse_depth[row * kSide];
+    for (std::size_t k = 0; k < kSide; k += 2) {
+      const Float8 two = __builtin_shufflevector(drawn(k), drawn(k + 1), 0, 1, 2, 3, 4, 5, 6, 7);
+      float* so_far = &tile.inverse_depth[k * kSide];
       const auto before = (Float8)((Int8)load_vector<Float8>(so_far) & touched);
       const Float8 after = two > before ? two : before;
       std::memcpy(so_far, &after, sizeof after);
       if constexpr (with_triangles) {
-        std::uint32_t* seen = &tile.triangle[row * kSide];
+        std::uint32_t* seen = &tile.triangle[k * kSide];
         const auto seen_before = load_vector<Uint8>(seen);
         const Uint8 seen_after = two > before ? triangle - Uint8{} : seen_before;
         std::memcpy(seen, &seen_after, sizeof seen_after);
       }
-      least = row == 0 || after < least ? after : least;
+      least = k == 0 || after < least ? after : least;
     }
     const Float4 low = __builtin_shufflevector(least, least, 0, 1, 2, 3);
     const Float4 high = __builtin_shufflevector(least, least, 4, 5, 6, 7);
     const Float4 four = low < high ? low : high;
     const Float4 across = __builtin_shufflevector(four, four, 2, 3, 0, 1);
     const Float4 two = four < across ? four : across;
-    least_[at] = two[0] < two[1] ? two[0] : two[1];
+    least_[at] = static_cast<double>(two[0] < two[1] ? two[0] : two[1]);
   }
 
   PinholeCamera camera_;
@@ -300,8 +297,8 @@ class TiledPicture {
   std::vector<double> ray_x_, ray_y_;  ///< of each column and row of pixels
   // Of each column and row of tiles: the rays through its first and last pixels.
   std::array<std::vector<double>, 2> border_x_, border_y_;
-  std::vector<Tile> tiles_;   ///< rows from the top
-  std::vector<float> least_;  ///< of each tile's inverse depths, 1/m
+  std::vector<Tile> tiles_;    ///< rows from the top
+  std::vector<double> least_;  ///< of each tile's inverse depths, 1/m
 };
 
 }  // namespace arex::sim

@@ -55,7 +55,9 @@ void VisualInertialOdometry::apply(const VisualUpdate& update) {
 
 OdometryNeed VisualInertialOdometry::need() const {
   if (odometry_.status == OdometryStatus::kOk) return OdometryNeed::kNothing;
-  return silence_.lasts() ? OdometryNeed::kImages : update_.need;
+  // Images without features are no silence of the camera; late ones, which lack nothing else, are.
+  const bool silent = to_seconds(newest_.stamp - update_.stamp) > health_.degenerate_silence_s;
+  return silent || update_.need == OdometryNeed::kNothing ? OdometryNeed::kImages : update_.need;
 }
 
 void VisualInertialOdometry::publish() {

@@ -68,11 +68,30 @@ std::optional<Line> local_line(const std::vector<Vec2>& near, const Vec2& place)
   return line_through(best);
 }
 
+/// Of each of the band's points whether something stands there: a duct's underside is one flat
+/// layer, and lines along it would cut the walls that it passes through.
+std::vector<std::uint8_t> standing(const Band& band, const ColumnIndex& index) {
+  constexpr float kAround = 0.12F, kLeast = 0.07F, kStorey = 1.5F;  // m
+  std::vector<std::uint8_t> stands(band.points.size(), 0);
+  for (std::size_t i = 0; i < band.points.size(); ++i) {
+    const Vec3f& p = band.points[i];
+    float low = p.z(), high = p.z();
+    index.within(p.x(), p.y(), kAround, [&](std::uint32_t k) {
+      const float z = band.points[k].z();
+      if (std::abs(z - p.z()) > kStorey) return;
+      low = std::min(low, z);
+      high = std::max(high, z);
+    });
+    stands[i] = high - low > kLeast ? 1 : 0;
+  }
+  return stands;
+}
+
 /// Grows wall faces in one storey's band.
 class WallGrower {
  public:
   WallGrower(const Band& band, const ColumnIndex& index)
-      : band_(band), index_(index), free_(band.points.size(), 1) {}
+      : band_(band), index_(index), free_(band.points.size(), 1), stands_(standing(band, index)) {}
 
   /// The long ones first, so that no short line takes a piece of a long one askew.
   std::vector<WallFace> grow_all() {
@@ -80,7 +99,7 @@ class WallGrower {
     for (const double least : {8.0, 3.0, kLeastWall}) {
       std::set<std::uint64_t> tried;
       for (std::size_t i = 0; i < band_.points.size(); ++i) {
-        if (free_[i] == 0 || tried.count(cell(i)) > 0) continue;
+        if (!is_open(i) || tried.count(cell(i)) > 0) continue;
         if (auto wall = grow_from(i, least)) {
           for (std::size_t k : members(*wall, kTaken)) free_[k] = 0;
           walls.push_back(*wall);
@@ -108,7 +127,7 @@ class WallGrower {
     const Vec3f& s = band_.points[seed];
     std::vector<Vec2> near;
     index_.within(s.x(), s.y(), kLocal, [&](std::uint32_t i) {
-      if (free_[i] != 0 && std::abs(band_.points[i].z() - s.z()) < kStorey) {
+      if (is_open(i) && std::abs(band_.points[i].z() - s.z()) < kStorey) {
         near.push_back(flat(band_.points[i]));
       }
     });
@@ -147,7 +166,7 @@ class WallGrower {
                       static_cast<float>(0.5 * kBin + kOnLine), [&](std::uint32_t i) {
                         const Vec2 p = flat(band_.points[i]);
                         const double at = (p - line.p).dot(line.u);
-                        if (free_[i] == 0 || line.distance(p) > kOnLine || at < t || at >= t + kBin)
+                        if (!is_open(i) || line.distance(p) > kOnLine || at < t || at >= t + kBin)
                           return;
                         if (std::abs(band_.points[i].z() - z) > kStorey) return;
                         taken.push_back(p);
@@ -208,9 +227,14 @@ class WallGrower {
     return out;
   }
 
+  /// Whether a wall may be made of it.
+  [[nodiscard]] bool is_open(std::size_t point) const {
+    return free_[point] != 0 && stands_[point] != 0;
+  }
+
   const Band& band_;
   const ColumnIndex& index_;
-  std::vector<std::uint8_t> free_;
+  std::vector<std::uint8_t> free_, stands_;
 };
 
 /// Whether things reach up through the metre below the band, and to the floor as far as one can

@@ -16,9 +16,11 @@ struct InfraredLightConfig {
   double sky_lx = 8e3;           ///< from all of the sky together, on level ground
   double sky_darkness = 0.5;     ///< the sky's near infrared over its light [E]: less is scattered
   bool lamps = true;
-  double lamp_flux_lm = 1800;  ///< of a strip of 1.5 m: 75 lx on the aisle, 15 in the bays
-  double draw_range_m = 45;    ///< further things are the backdrop's
-  double grid_m = 0.8;         ///< least spacing of the nodes that hold the indirect light
+  double lamp_flux_lm = 1800;    ///< of a strip of 1.5 m: 75 lx on the aisle, 15 in the bays
+  double draw_range_m = 45;      ///< further things are the backdrop's
+  double least_leaf_px = 4;      ///< [E] far leaves are merged to this, the side of a square
+  double least_width_px = 0.35;  ///< [E] solids thinner than this are not drawn: far twigs
+  double grid_m = 0.8;           ///< least spacing of the nodes that hold the indirect light
 
   void fields(auto& f) {
     f("sun", sun, "it shines; off, an overcast sky is left");
@@ -31,6 +33,8 @@ struct InfraredLightConfig {
     f("lamps", lamps, "lamps under ceilings are lit");
     f("lamp_flux_lm", lamp_flux_lm, "luminous flux of each");
     f("draw_range_m", draw_range_m, "what lies further is not drawn");
+    f("least_leaf_px", least_leaf_px, "smaller leaves are merged into larger ones; 0: never");
+    f("least_width_px", least_width_px, "thinner solids are not drawn; 0: all are");
     f("grid_m", grid_m, "least spacing of the grid of light from sky, lamps and surfaces");
     f.check(sun_elevation_rad > 0 && sun_elevation_rad <= std::numbers::pi / 2,
             "0 < sun_elevation_rad <= pi/2");
@@ -40,6 +44,8 @@ struct InfraredLightConfig {
     f.check(sky_darkness >= 0 && sky_darkness <= 1, "0 <= sky_darkness <= 1");
     f.check(lamp_flux_lm >= 0 && lamp_flux_lm <= 1e5, "0 <= lamp_flux_lm <= 1e5");
     f.check(draw_range_m >= 1 && draw_range_m <= 2000, "1 <= draw_range_m <= 2000");
+    f.check(least_leaf_px >= 0 && least_leaf_px <= 20, "0 <= least_leaf_px <= 20");
+    f.check(least_width_px >= 0 && least_width_px <= 5, "0 <= least_width_px <= 5");
     f.check(grid_m >= 0.2 && grid_m <= 20, "0.2 <= grid_m <= 20");
   }
 };

@@ -52,9 +52,9 @@ class LightGrid {
     return {(w.x() * faces[x] + w.y() * faces[y]) + w.z() * faces[z],
             (w.x() * faces[x ^ 1] + w.y() * faces[y ^ 1]) + w.z() * faces[z ^ 1]};
   }
-  /// The same of eight surfaces, by their coordinates.
+  /// The same of eight surfaces, by their coordinates. @param with_far otherwise it is 0
   [[nodiscard]] Sides<Float8> sides(const std::array<Float8, 3>& p_W,
-                                    const std::array<Float8, 3>& n) const {
+                                    const std::array<Float8, 3>& n, bool with_far) const {
     const auto [x, fx] = cells(p_W[0], 0);
     const auto [y, fy] = cells(p_W[1], 1);
     const auto [z, fz] = cells(p_W[2], 2);
@@ -66,15 +66,21 @@ class LightGrid {
     }
     const Int8 of_lane{0, 8, 16, 24, 32, 40, 48, 56};
     const auto* from = reinterpret_cast<const float*>(faces.data());
-    std::array<Float8, 3> near, far;
+    std::array<Int8, 3> side;
+    std::array<Float8, 3> weight;
     for (std::size_t i = 0; i < 3; ++i) {
-      const Int8 first = of_lane + static_cast<std::int32_t>(2 * i);
-      const Int8 side = n[i] > 0 ? Int8{} : Int8{} + 1;
-      const Float8 weight = n[i] * n[i];
-      near[i] = weight * gather(from, first + side);
-      far[i] = weight * gather(from, first + (side ^ 1));
+      side[i] = n[i] > 0 ? Int8{} : Int8{} + 1;
+      weight[i] = n[i] * n[i];
     }
-    return {(near[0] + near[1]) + near[2], (far[0] + far[1]) + far[2]};
+    const auto sum_of = [&](std::int32_t turned) {
+      std::array<Float8, 3> part;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Int8 first = of_lane + static_cast<std::int32_t>(2 * i);
+        part[i] = weight[i] * gather(from, first + (side[i] ^ turned));
+      }
+      return (part[0] + part[1]) + part[2];
+    };
+    return {sum_of(0), with_far ? sum_of(1) : Float8{}};
   }
   /// Of a surface: illuminance, lx.
   static float sum(const Float8& faces, const Float8& surface) {

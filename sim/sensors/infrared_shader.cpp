@@ -34,7 +34,7 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
       sun_lx_(light.sun ? static_cast<float>(light.sun_lx) : 0),
       surfaces_(world, lamps_, grid_, sun_, sun_lx_),
       backdrop_(light, world),
-      renderer_(world, fine_, {.far_m = light.draw_range_m}),
+      renderer_(world, fine_, renderer_options(light)),
       lamp_lx_(static_cast<float>(light.lamp_flux_lm / kStripArea)),
       pixel_rad_(static_cast<float>(1 / camera.fx)),
       off_surface_m_(static_cast<float>(0.6 * grid_.spacing_m())) {

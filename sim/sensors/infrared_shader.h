@@ -44,6 +44,12 @@ class InfraredShader {
   [[nodiscard]] const LightGrid& grid() const { return grid_; }
   /// The pinhole of the samples.
   [[nodiscard]] const PinholeCamera& sample_camera() const { return fine_; }
+  /// How they are drawn.
+  static RendererOptions renderer_options(const InfraredLightConfig& light) {
+    return {.far_m = light.draw_range_m,
+            .least_leaf_px = kSamples * light.least_leaf_px,
+            .least_width_px = kSamples * light.least_width_px};
+  }
 
  private:
   struct View {

@@ -77,9 +77,10 @@ Float8 InfraredShader::lit_from_place_to_place(const Material& material, const E
     normal[k] = from_behind ? -facets.normal_W[k] : facets.normal_W[k];
     off[k] = p[k] + off_surface_m_ * normal[k];
   }
-  const auto sides = grid_.sides(off, normal);
+  const bool translucent = material.translucency != 0;
+  const auto sides = grid_.sides(off, normal, translucent);
   Float8 lux = sides.near;
-  if (material.translucency != 0) lux += material.translucency * sides.far;
+  if (translucent) lux += material.translucency * sides.far;
   const Vec3f& sun = sun_.direction_W();
   const Float8 zero{};
   const Float8 facing = normal[0] * sun.x() + (normal[1] * sun.y() + normal[2] * sun.z());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <compare>
 #include <cstdint>
 #include <cstring>
@@ -18,6 +19,8 @@ namespace {
 constexpr double kEdgeOn = 1e-9;
 // What a triangle's bounds in the image are widened by, px: far more than their rounding.
 constexpr double kBoundsMargin = 1e-6;
+// What leaves are enlarged to at most.
+constexpr double kMostLarger = 4;
 
 /// A corner of a triangle.
 struct Corner {
@@ -36,7 +39,25 @@ struct Shown {
 struct Seen {
   double depth = 0;
   std::uint32_t chunk = 0, cluster = 0;
+  double share = 1;  ///< of its leaves that is drawn
   auto operator<=>(const Seen&) const = default;
+};
+
+/// Where the camera is, for vectors of four.
+struct View {
+  Double4 x_axis, y_axis, z_axis, origin;  ///< of X_CW
+  Double4 focal, centre;
+
+  View(const Pose& X_CW, const PinholeCamera& camera)
+      : x_axis(packed(X_CW.R.col(0))),
+        y_axis(packed(X_CW.R.col(1))),
+        z_axis(packed(X_CW.R.col(2))),
+        origin(packed(X_CW.p)),
+        focal{camera.fx, camera.fy, 1, 1},
+        centre{camera.cx, camera.cy, 0, 0} {}
+
+ private:
+  static Double4 packed(const Vec3& v) { return Double4{v.x(), v.y(), v.z(), 0}; }
 };
 
 }  // namespace
@@ -46,15 +67,19 @@ struct Renderer::Impl {
        const RendererOptions& options_in)
       : camera(camera_in),
         options(options_in),
-        mesh(world.mesh),
+        mesh(world, options_in.least_leaf_px > 0 || options_in.least_width_px > 0),
         depths(camera),
         surfaces(camera) {}
 
   template <class Picture>
   void draw_all(const Pose& X_WC, Picture& picture);
   template <class Picture>
-  void draw(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW, Picture& picture);
-  void place(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW);
+  void draw(const DepthChunk& chunk, const Cluster& cluster, double share, const View& view,
+            Picture& picture);
+  [[nodiscard]] double share_of(const Cluster& cluster, const Vec3& eye_W) const;
+  std::size_t place_leaves(const DepthChunk& chunk, const Cluster& cluster, double share,
+                           const View& view);
+  void place(std::size_t corner, double x_W, double y_W, double z_W, const View& view);
   [[nodiscard]] std::vector<Seen> visible(const Pose& X_WC);
   [[nodiscard]] PixelBox box_of(const Corner& a, const Corner& b, const Corner& c) const;
   [[nodiscard]] static bool footprint(const Double4& a, const Double4& b, const Double4& c,
@@ -70,22 +95,43 @@ struct Renderer::Impl {
   Statistics last_frame;
 };
 
-/// Brings a cluster's corners into C and into the picture.
-void Renderer::Impl::place(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW) {
-  const auto packed = [](const Vec3& v) { return Double4{v.x(), v.y(), v.z(), 0}; };
-  const Double4 x_axis = packed(X_CW.R.col(0)), y_axis = packed(X_CW.R.col(1));
-  const Double4 z_axis = packed(X_CW.R.col(2)), origin = packed(X_CW.p);
-  const Double4 focal{camera.fx, camera.fy, 1, 1}, centre{camera.cx, camera.cy, 0, 0};
-  const float* x = &chunk.x[cluster.first_corner];
-  const float* y = &chunk.y[cluster.first_corner];
-  const float* z = &chunk.z[cluster.first_corner];
-  for (std::size_t i = 0; i < cluster.corner_count; ++i) {
-    const double x_W = x[i], y_W = y[i], z_W = z[i];
-    const Double4 p = x_axis * x_W + y_axis * y_W + z_axis * z_W + origin;
-    const Double4 depth = __builtin_shufflevector(p, p, 2, 2, 2, 2);
-    corners[i].in_C = p;
-    corners[i].in_picture = __builtin_shufflevector(centre + focal * p / depth, depth, 0, 1, 4, 4);
+/// Brings a corner into C and into the picture.
+void Renderer::Impl::place(std::size_t corner, double x_W, double y_W, double z_W,
+                           const View& view) {
+  const Double4 p = view.x_axis * x_W + view.y_axis * y_W + view.z_axis * z_W + view.origin;
+  const Double4 depth = __builtin_shufflevector(p, p, 2, 2, 2, 2);
+  corners[corner].in_C = p;
+  corners[corner].in_picture =
+      __builtin_shufflevector(view.centre + view.focal * p / depth, depth, 0, 1, 4, 4);
+}
+
+/// The corners of a cluster's first leaves, each leaf larger about its middle, so that a share of
+/// them covers what all of them do. The last one grows with the share, so that nothing jumps.
+/// @return how many leaves
+std::size_t Renderer::Impl::place_leaves(const DepthChunk& chunk, const Cluster& cluster,
+                                         double share, const View& view) {
+  constexpr std::size_t kCorners = 4;
+  const double wanted = share * cluster.corner_count / kCorners;
+  const auto whole = static_cast<std::size_t>(wanted);
+  const double rest = wanted - static_cast<double>(whole);
+  const std::size_t count = whole + (rest > 0 ? 1 : 0);
+  const double scale = std::sqrt(1 / share);
+  for (std::size_t leaf = 0; leaf < count; ++leaf) {
+    const double larger = leaf < whole ? scale : scale * std::sqrt(rest);
+    std::array<Vec3, kCorners> p_W;
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = 0; k < kCorners; ++k) {
+      const std::size_t i = cluster.first_corner + kCorners * leaf + k;
+      p_W[k] = Vec3(chunk.x[i], chunk.y[i], chunk.z[i]);
+      sum += p_W[k];
+    }
+    const Vec3 middle = sum / kCorners;
+    for (std::size_t k = 0; k < kCorners; ++k) {
+      const Vec3 p = middle + larger * (p_W[k] - middle);
+      place(kCorners * leaf + k, p.x(), p.y(), p.z(), view);
+    }
   }
+  return count;
 }
 
 /// The pixels whose centres a triangle may cover: all of them where it reaches behind the near
@@ -143,12 +189,22 @@ bool Renderer::Impl::footprint(const Double4& a, const Double4& b, const Double4
 }
 
 template <class Picture>
-void Renderer::Impl::draw(const DepthChunk& chunk, const Cluster& cluster, const Pose& X_CW,
-                          Picture& picture) {
-  place(chunk, cluster, X_CW);
+void Renderer::Impl::draw(const DepthChunk& chunk, const Cluster& cluster, double share,
+                          const View& view, Picture& picture) {
+  std::size_t triangles = cluster.part.triangle_count;
+  if (share < 1) {
+    triangles = 2 * place_leaves(chunk, cluster, share, view);
+  } else {
+    const std::size_t first = cluster.first_corner;
+    for (std::size_t i = 0; i < cluster.corner_count; ++i) {
+      place(i, chunk.x[first + i], chunk.y[first + i], chunk.z[first + i], view);
+    }
+  }
+  last_frame.triangles += triangles;
   // Step by step, so that what becomes of one triangle does not keep the next one waiting.
+  const bool closed = cluster.kind == ClusterKind::kSolid;
   std::size_t count = 0;
-  for (std::uint32_t i = 0; i < cluster.part.triangle_count; ++i) {
+  for (std::uint32_t i = 0; i < triangles; ++i) {
     const auto& [a, b, c] = chunk.triangles[cluster.part.first_triangle + i];
     Shown& next = shown[count];
     next.box = box_of(corners[a], corners[b], corners[c]);
@@ -159,8 +215,8 @@ void Renderer::Impl::draw(const DepthChunk& chunk, const Cluster& cluster, const
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [a, b, c] = chunk.triangles[shown[i].triangle];
     Shown& next = shown[kept];
-    const bool seen = footprint(corners[a].in_C, corners[b].in_C, corners[c].in_C, cluster.closed,
-                                next.footprint);
+    const bool seen =
+        footprint(corners[a].in_C, corners[b].in_C, corners[c].in_C, closed, next.footprint);
     next.box = shown[i].box;
     next.triangle = shown[i].triangle;
     kept += seen ? 1 : 0;
@@ -171,21 +227,42 @@ void Renderer::Impl::draw(const DepthChunk& chunk, const Cluster& cluster, const
   }
 }
 
+/// What share of its leaves is drawn of a cluster; 0: nothing of it, 1: all of it.
+double Renderer::Impl::share_of(const Cluster& cluster, const Vec3& eye_W) const {
+  if (cluster.width_m == DetailOfMesh::kAlways) return 1;
+  // The distance, not the depth: a camera that turns sees the same leaves.
+  const double distance = (cluster.part.bounds.center().cast<double>() - eye_W).norm();
+  const double width_px = cluster.width_m * camera.fx / distance;
+  if (cluster.kind != ClusterKind::kLeaves) return width_px < options.least_width_px ? 0 : 1;
+  const double wanted_px = std::min(options.least_leaf_px, kMostLarger * width_px);
+  return width_px < wanted_px ? (width_px / wanted_px) * (width_px / wanted_px) : 1;
+}
+
 /// The clusters to draw, in their order.
 std::vector<Seen> Renderer::Impl::visible(const Pose& X_WC) {
   std::vector<Seen> found;
   const ViewVolume view(camera, X_WC, options.far_m);
   for (std::uint32_t i = 0; i < mesh.bounds().size(); ++i) {
     const bool empty = mesh.bounds()[i].triangle_count == 0;
-    if (empty || (options.cull && !view.touches(mesh.bounds()[i].bounds))) continue;
+    const float reach_m = mesh.leaf_reach_m(i);
+    const auto grown = [reach_m](const Eigen::AlignedBox3f& box, double larger) {
+      const Vec3f more = Vec3f::Constant(reach_m * static_cast<float>(larger - 1));
+      return Eigen::AlignedBox3f(box.min() - more, box.max() + more);
+    };
+    if (empty || (options.cull && !view.touches(grown(mesh.bounds()[i].bounds, kMostLarger)))) {
+      continue;
+    }
     const std::vector<Cluster>& clusters = mesh.chunk(i).clusters;
     for (std::uint32_t k = 0; k < clusters.size(); ++k) {
-      const Eigen::AlignedBox3f& bounds = clusters[k].part.bounds;
+      const double share = share_of(clusters[k], X_WC.p);
+      if (share == 0) continue;
       if (!options.cull) {
-        found.push_back({0, i, k});
-      } else if (view.touches(bounds)) {
-        found.push_back({view.nearest_depth(bounds), i, k});
+        found.push_back({0, i, k, share});
+        continue;
       }
+      const Eigen::AlignedBox3f& own = clusters[k].part.bounds;
+      const Eigen::AlignedBox3f bounds = share < 1 ? grown(own, std::sqrt(1 / share)) : own;
+      if (view.touches(bounds)) found.push_back({view.nearest_depth(bounds), i, k, share});
     }
   }
   std::sort(found.begin(), found.end());
@@ -197,12 +274,10 @@ void Renderer::Impl::draw_all(const Pose& X_WC, Picture& picture) {
   const std::vector<Seen> clusters = visible(X_WC);
   picture.clear();
   last_frame = {clusters.size(), 0};
-  const Pose X_CW = X_WC.inverse();
-  for (const Seen& seen_cluster : clusters) {
-    const DepthChunk& chunk = mesh.chunk(seen_cluster.chunk);
-    const Cluster& cluster = chunk.clusters[seen_cluster.cluster];
-    draw(chunk, cluster, X_CW, picture);
-    last_frame.triangles += cluster.part.triangle_count;
+  const View view(X_WC.inverse(), camera);
+  for (const Seen& next : clusters) {
+    const DepthChunk& chunk = mesh.chunk(next.chunk);
+    draw(chunk, chunk.clusters[next.cluster], next.share, view, picture);
   }
 }
 

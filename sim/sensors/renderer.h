@@ -16,6 +16,11 @@ struct RendererOptions {
   double near_m = 0.02;  ///< nothing closer is drawn
   double far_m = 12.0;   ///< nothing deeper is drawn
   bool cull = true;      ///< draw only the chunks that may be seen; off, for tests
+  /// Leaves that would look smaller, as squares of this side, are merged into fewer and larger
+  /// ones; 0: never (DetailOfMesh).
+  double least_leaf_px = 0;
+  /// Solids that would look thinner are left out; 0: none.
+  double least_width_px = 0;
 };
 
 /// What a pinhole camera sees of a world: a depth rasteriser on the CPU.

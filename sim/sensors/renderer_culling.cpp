@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <compare>
-#include <numeric>
+#include <limits>
 #include <span>
 #include <utility>
+
+#include "math/mix.h"
+#include "sensors/mesh_surfaces.h"
 
 namespace arex::sim {
 namespace {
@@ -38,46 +42,6 @@ std::uint32_t morton_code(const Vec3f& p, const Eigen::AlignedBox3f& bounds) {
          spread(static_cast<std::uint32_t>(cell.y())) << 1U |
          spread(static_cast<std::uint32_t>(cell.z())) << 2U;
 }
-
-/// Triangles that hang together by shared vertices, each such surface named by one of its vertices.
-class Surfaces {
- public:
-  explicit Surfaces(const worlds::Mesh& mesh) : mesh_(mesh), parent_(mesh.vertices.size()) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-    for (const auto& [a, b, c] : mesh.triangles) {
-      parent_[find(b)] = find(a);
-      parent_[find(c)] = find(a);
-    }
-    for (std::uint32_t vertex = 0; vertex < parent_.size(); ++vertex)
-      parent_[vertex] = find(vertex);
-  }
-
-  /// Hands over each surface's triangles, ascending, and its name.
-  template <class Visit>
-  void each(const Visit& visit) const {
-    std::vector<std::uint32_t> end(parent_.size() + 1, 0);
-    for (const auto& triangle : mesh_.triangles) ++end[parent_[triangle[0]] + 1];
-    for (std::size_t vertex = 0; vertex < parent_.size(); ++vertex) end[vertex + 1] += end[vertex];
-    std::vector<std::uint32_t> grouped(mesh_.triangles.size());
-    for (std::uint32_t t = 0; t < grouped.size(); ++t) {
-      grouped[end[parent_[mesh_.triangles[t][0]]]++] = t;
-    }
-    // What began where the one before ended now ends there itself.
-    for (std::uint32_t vertex = 0, first = 0; vertex < parent_.size(); ++vertex) {
-      const std::uint32_t last = end[vertex];
-      if (last > first) visit(std::span(grouped).subspan(first, last - first), vertex);
-      first = last;
-    }
-  }
-
- private:
-  std::uint32_t find(std::uint32_t vertex) {
-    while (parent_[vertex] != vertex) vertex = parent_[vertex] = parent_[parent_[vertex]];
-    return vertex;
-  }
-  const worlds::Mesh& mesh_;
-  std::vector<std::uint32_t> parent_;
-};
 
 /// One triangle's run along an edge, from its lower to its higher vertex or back.
 struct EdgeSide {
@@ -173,6 +137,47 @@ class WindingOfSurface {
   std::vector<std::uint32_t> reached_;
 };
 
+/// Where a triangle comes among its chunk's.
+struct InCluster {
+  ClusterKind kind = ClusterKind::kOpen;
+  int width_step = 0;      ///< of the logarithm of its width: what is alike from afar
+  std::uint64_t code = 0;  ///< along the Morton curve
+  std::uint32_t piece = 0, triangle = 0;
+  auto operator<=>(const InCluster&) const = default;
+};
+
+/// Two for each doubling.
+int width_step(float width_m) {
+  if (width_m == DetailOfMesh::kAlways) return std::numeric_limits<int>::max();
+  int exponent = 0;
+  constexpr float kRootHalf = 0.70710678F;
+  return (std::frexp(width_m, &exponent) < kRootHalf ? -1 : 0) + 2 * exponent;
+}
+
+InCluster place_of(const worlds::Mesh& mesh, const worlds::Chunk& chunk,
+                   const std::vector<std::int8_t>& winding, const DetailOfMesh& detail,
+                   std::uint32_t triangle) {
+  using Part = DetailOfMesh::Part;
+  InCluster place{winding[triangle] != 0 ? ClusterKind::kSolid : ClusterKind::kOpen, 0, 0, triangle,
+                  triangle};
+  if (!detail.none()) {
+    const bool first_here = detail.leaf[triangle] == Part::kFirst &&
+                            triangle + 1 < chunk.first_triangle + chunk.triangle_count;
+    const bool second_here =
+        detail.leaf[triangle] == Part::kSecond && triangle > chunk.first_triangle;
+    if (first_here || second_here) {
+      place.kind = ClusterKind::kLeaves;
+      place.piece = second_here ? triangle - 1 : triangle;
+    }
+    const bool torn = detail.leaf[triangle] != Part::kNone && place.kind != ClusterKind::kLeaves;
+    place.width_step = width_step(torn ? DetailOfMesh::kAlways : detail.width_m[triangle]);
+  }
+  const auto& [a, b, c] = mesh.triangles[place.piece];
+  const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
+  place.code = morton_code(centroid, chunk.bounds);
+  return place;
+}
+
 }  // namespace
 
 ViewVolume::ViewVolume(const PinholeCamera& camera, const Pose& X_WC, double far_m) {
@@ -205,7 +210,7 @@ double ViewVolume::nearest_depth(const Eigen::AlignedBox3f& box) const {
 
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh) {
   std::vector<std::int8_t> winding(mesh.triangles.size(), 0);
-  const Surfaces surfaces(mesh);
+  const MeshSurfaces surfaces(mesh);
   WindingOfSurface of_surface(mesh);
   surfaces.each([&](std::span<const std::uint32_t> triangles, std::uint32_t vertex) {
     constexpr std::size_t kFewestOfASolid = 4;
@@ -215,36 +220,42 @@ std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh) {
 }
 
 ClusteredChunk cluster_chunk(const worlds::Mesh& mesh, const worlds::Chunk& chunk,
-                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles) {
+                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles,
+                             const DetailOfMesh& detail) {
+  std::vector<InCluster> order;
+  for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
+    order.push_back(place_of(mesh, chunk, winding, detail, chunk.first_triangle + i));
+  }
+  std::sort(order.begin(), order.end());
   ClusteredChunk out;
   out.triangles.reserve(chunk.triangle_count);
   out.source.reserve(chunk.triangle_count);
-  const auto add_to_last_cluster = [&](std::uint32_t source) {
-    worlds::Chunk& cluster = out.clusters.back();
-    std::array<std::uint32_t, 3> triangle = mesh.triangles[source];
-    if (winding[source] < 0) std::swap(triangle[1], triangle[2]);
-    for (const std::uint32_t vertex : triangle) cluster.bounds.extend(mesh.vertices[vertex]);
-    out.triangles.push_back(triangle);
-    out.source.push_back(source);
-    ++cluster.triangle_count;
-  };
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // Morton code, triangle
-  for (const bool closed : {true, false}) {
-    order.clear();
-    for (std::uint32_t i = 0; i < chunk.triangle_count; ++i) {
-      const std::uint32_t triangle = chunk.first_triangle + i;
-      if ((winding[triangle] != 0) != closed) continue;
-      const auto& [a, b, c] = mesh.triangles[triangle];
-      const Vec3f centroid = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3.0F;
-      order.emplace_back(morton_code(centroid, chunk.bounds), triangle);
+  for (std::size_t first = 0; first < order.size();) {
+    std::size_t end = first;
+    const auto alike = [&](const InCluster& other) {
+      return other.kind == order[first].kind && other.width_step == order[first].width_step;
+    };
+    while (end < order.size() && end - first < max_triangles && alike(order[end])) ++end;
+    if (order[first].kind == ClusterKind::kLeaves) {
+      for (std::size_t i = first; i < end; ++i) order[i].code = mix_bits(order[i].piece);
+      std::sort(order.begin() + static_cast<std::ptrdiff_t>(first),
+                order.begin() + static_cast<std::ptrdiff_t>(end));
     }
-    std::sort(order.begin(), order.end());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      if (i % max_triangles == 0) {
-        out.clusters.push_back({static_cast<std::uint32_t>(out.triangles.size()), 0, {}});
-        out.closed.push_back(closed);
+    out.clusters.push_back(
+        {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(end - first), {}});
+    out.kind.push_back(order[first].kind);
+    out.width_m.push_back(0);
+    for (; first < end; ++first) {
+      const std::uint32_t source = order[first].triangle;
+      std::array<std::uint32_t, 3> triangle = mesh.triangles[source];
+      if (winding[source] < 0) std::swap(triangle[1], triangle[2]);
+      for (const std::uint32_t vertex : triangle) {
+        out.clusters.back().bounds.extend(mesh.vertices[vertex]);
       }
-      add_to_last_cluster(order[i].second);
+      out.width_m.back() = std::max(out.width_m.back(),
+                                    detail.none() ? DetailOfMesh::kAlways : detail.width_m[source]);
+      out.triangles.push_back(triangle);
+      out.source.push_back(source);
     }
   }
   return out;

@@ -6,6 +6,7 @@
 
 #include "math/pose.h"
 #include "messages/sensors.h"
+#include "sensors/renderer_detail.h"
 #include "worlds/world.h"
 
 namespace arex::sim {
@@ -35,6 +36,13 @@ class ViewVolume {
 /// triangles and it has an inside. The mesh's own winding does not matter.
 std::vector<std::int8_t> outward_winding(const worlds::Mesh& mesh);
 
+/// What a cluster's triangles are.
+enum class ClusterKind : std::uint8_t {
+  kSolid,  ///< they bound solids: of each its far side is never seen
+  kOpen,
+  kLeaves,  ///< pairs, each a leaf, in the order in which leaves are drawn
+};
+
 /// A chunk of a mesh cut finer, for culling: a view touches the clusters it needs and few more.
 struct ClusteredChunk {
   /// The chunk's own, grouped by cluster, corners as in the mesh; those of closed surfaces
@@ -42,13 +50,17 @@ struct ClusteredChunk {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint32_t> source;    ///< of each triangle: its index in the mesh
   std::vector<worlds::Chunk> clusters;  ///< cover the chunk's triangles once, in order
-  std::vector<bool> closed;             ///< of each cluster: all its triangles bound solids
+  std::vector<ClusterKind> kind;        ///< of each cluster
+  std::vector<float> width_m;           ///< of each cluster, of its widest piece: DetailOfMesh
 };
 
-/// The chunk's triangles along a Morton curve, cut into runs of at most `max_triangles`.
+/// The chunk's triangles, those of one kind and of about one width along a Morton curve, cut into
+/// runs of at most `max_triangles`.
 /// @param winding that of the mesh
+/// @pre max_triangles is even
 ClusteredChunk cluster_chunk(const worlds::Mesh& mesh, const worlds::Chunk& chunk,
-                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles);
+                             const std::vector<std::int8_t>& winding, std::uint32_t max_triangles,
+                             const DetailOfMesh& detail = {});
 
 /// Indices of the chunks or clusters that may be seen, nearest first (ties by index).
 std::vector<std::uint32_t> visible_chunks(const std::vector<worlds::Chunk>& chunks,

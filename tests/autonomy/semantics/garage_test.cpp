@@ -216,6 +216,25 @@ TEST(GarageMap, FindsWallsAndPillarsBelowALowCeiling) {
   EXPECT_GT(wall->size.x(), 6.5);
 }
 
+TEST(GarageMap, TakesNoPieceOfAWallBelowDuctsForAPillar) {
+  for (const double height : {2.3, 2.4, 2.5}) {
+    AnalyticGarage garage(0, Vec3::Zero(), 9);
+    garage.build();
+    // Ducts pass through a wall: lines along their undersides are longer than the wall is, and
+    // what they leave of it is as short as a pillar is wide.
+    partition(garage, {7.5, 12}, {7.5, 18});
+    for (const double y : {12.8, 14.6, 16.3}) {
+      garage.face({0.3, y, height}, {14, 0, 0}, {0, 1.2, 0});
+    }
+    const SemanticMap map = build_semantic_map(garage.points, {}, {});
+    expect_pillars(map, garage);
+    const SemanticObject* wall = nearest(map, SemanticClass::kWall, {7.5, 15});
+    ASSERT_NE(wall, nullptr);
+    EXPECT_LT((wall->position.head<2>() - Vec2(7.5, 15)).norm(), 0.4) << height;
+    EXPECT_GT(wall->size.x(), 5) << height;
+  }
+}
+
 TEST(GarageMap, TakesNoRowOfCabinetsForACar) {
   AnalyticGarage garage(0.4, {3, 2, 0}, 6);
   garage.build();

@@ -70,7 +70,7 @@ void measure(const std::string& name, const worlds::World& world, double z_from,
               name.c_str(), world.mesh.triangles.size(), pair.shader().lamps().size(),
               pair.shader().grid().nodes(), pair.shader().grid().spacing_m(), t1 - t0);
   sim::Renderer renderer(world, pair.shader().sample_camera(),
-                         {.far_m = config.light.draw_range_m});
+                         sim::InfraredShader::renderer_options(config.light));
   sim::AutoExposure exposure(config.sensor);
   RandomStream random(2, "poses");
   std::vector<double> draw_ms, left_ms, pair_ms, drawn;

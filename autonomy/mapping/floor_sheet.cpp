@@ -1,6 +1,7 @@
 #include "mapping/floor_sheet.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <deque>
 #include <utility>
@@ -48,6 +49,8 @@ constexpr double kUnder = 25;
 constexpr int kMostUnder = 3;
 /// Layers of the vehicle above the floor that it flies over.
 constexpr double kLeastAbove = 3, kMostAbove = 35;
+/// Columns of a tile that make a floor where none was expected: half of it, not a wall's top.
+constexpr int kLeastBeneath = 32;
 /// Tiles about its way of which a vehicle that flies there has seen what there is to see.
 constexpr int kFlownBeside = 2;
 
@@ -217,12 +220,32 @@ void FloorSheet::follow_way() {
     const Label& before = tiles_[t].shown;
     const double above = place.layer - before.plane.height;
     const bool follows = label.seen && label.plane.height <= place.layer - kLeastAbove;
-    if (!follows && before.known && before.seen && above >= kLeastAbove && above <= kMostAbove) {
+    const bool deep = follows && label.plane.height < place.layer - kMostAbove;
+    // From high over a ramp's foot it comes over the yard behind: between it and the hall's floor.
+    if (const auto beneath = deep ? floor_beneath(tiles_[t].feet, place.layer) : std::nullopt) {
+      label.plane = *beneath;
+    } else if (!follows && before.known && before.seen && above >= kLeastAbove &&
+               above <= kMostAbove) {
       label = before;
     }
     tiles_[t].label = label;
     tiles_[t].pinned = true;
   }
+}
+
+/// The highest floor below a vehicle in this layer, if it flies that low.
+std::optional<TilePlane> FloorSheet::floor_beneath(const std::vector<Feet>& feet, int layer) const {
+  for (std::size_t k = feet.size(); k-- > 0;) {
+    const double above = layer - feet[k].layer;
+    if (above < kLeastAbove || above > kMostAbove) continue;
+    const bool two = k > 0 && feet[k - 1].layer == feet[k].layer - 1;
+    const std::uint64_t columns = feet[k].columns | (two ? feet[k - 1].columns : 0);
+    if (std::popcount(columns) < kLeastBeneath) continue;
+    TilePlane level;
+    level.height = feet[k].layer;
+    if (auto floor = find_floor(feet, level, kTolerance)) return floor;
+  }
+  return std::nullopt;
 }
 
 void FloorSheet::pin_corridor() {

@@ -146,6 +146,8 @@ class FloorSheet {
   void cut_short();
   [[nodiscard]] bool meet(std::size_t from, std::size_t to, const Eigen::Vector2i& step) const;
   void follow_way();
+  [[nodiscard]] std::optional<TilePlane> floor_beneath(const std::vector<Feet>& feet,
+                                                       int layer) const;
   void pin_corridor();
   [[nodiscard]] bool leads_on(std::size_t tile) const;
   void join_seen();

@@ -349,6 +349,38 @@ TEST(FloorSheet, FliesOverAnEdgeToAFloorThatItKnows) {
   EXPECT_NEAR(height(sheet, 14, 9), -std::tan(M_PI / 6) * (8 * 14 + 4 - 24), 1.5);
 }
 
+// High over the ramp's shaft and on, over the yard behind it: the vehicle is over the yard, though
+// the hall's floor below was seen through the portal and goes on from the ramp's.
+TEST(FloorSheet, FliesOverAShaftToTheYardBehindIt) {
+  const double slope = std::tan(M_PI / 6);
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    FloorSheet sheet = make_sheet();
+    Site site = make_garage(seed);
+    site.give_to(sheet);
+    for (int x = 0; x < 24; ++x) {
+      sheet.note_place({x, 10}, 13);
+      sheet.spread();
+    }
+    for (int x = 21; x < 26; ++x) EXPECT_NEAR(height(sheet, x, 10), 0, 1) << x;
+    for (int x = 4; x < 16; ++x) EXPECT_NEAR(height(sheet, x, 10), -slope * (8 * x + 4 - 24), 1.5);
+    EXPECT_NEAR(height(sheet, 10, 4), -80, 1);  // the hall beside the ramp
+    // Back, and down: over the hall's floor, under the yard.
+    for (int x = 24; x > 6; --x) {
+      sheet.note_place({x, 10}, 13);
+      sheet.spread();
+    }
+    for (int x = 7; x < 24; ++x) {
+      const double floor = -std::min(80.0, std::max(0.0, slope * (8 * x + 4 - 24)));
+      sheet.note_place({x, 10}, static_cast<int>(15 + floor));
+      sheet.spread();
+    }
+    for (int x = 4; x < 28; ++x) {
+      EXPECT_NEAR(height(sheet, x, 10), std::max(-80.0, -slope * (8 * x + 4 - 24)), 1.5) << x;
+    }
+    EXPECT_NEAR(height(sheet, 1, 10), 0, 1);
+  }
+}
+
 TEST(FloorSheet, ClimbsNoCarAndFindsTheFloorBehindIt) {
   FloorSheet sheet = make_sheet();
   Site site;

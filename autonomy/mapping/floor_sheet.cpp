@@ -281,6 +281,21 @@ bool FloorSheet::leads_on(std::size_t t) const {
   return tiles_[t].label.plane.height <= here + kOwnStorey;
 }
 
+/// A ramp is larger than a tile; one tile alone that slopes is the foot of something.
+bool FloorSheet::is_of_ramp(std::size_t t, const Eigen::Vector2i& step) const {
+  if (contains(tile_of(t) - step)) {
+    const Label& above = tiles_[index(tile_of(t) - step)].label;
+    if (above.known && dives(above.plane, step)) return true;
+  }
+  for (const int side : {-1, 1}) {
+    const Eigen::Vector2i across(-side * step.y(), side * step.x());
+    if (!contains(tile_of(t) + across)) continue;
+    const Label beside = go_on(tiles_[t].label, across, index(tile_of(t) + across));
+    if (beside.seen && dives(beside.plane, step)) return true;
+  }
+  return false;
+}
+
 /// From the corridor over all that goes on with it. Where floors lie above each other a tile has
 /// the lowest that is joined; one that dives under another goes on under it, unseen.
 void FloorSheet::join_seen() {
@@ -302,6 +317,7 @@ void FloorSheet::join_seen() {
       Label label = go_on(tiles_[t].label, step, there);
       if (!label.seen) {
         if (s >= 4 || label.guessed > kMostDived || !dives(tiles_[t].label.plane, step)) continue;
+        if (tiles_[t].label.seen && !is_of_ramp(t, step)) continue;
         label.plane = expected;
       }
       const double above = label.plane.height - before.plane.height;

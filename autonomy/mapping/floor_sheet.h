@@ -150,6 +150,7 @@ class FloorSheet {
                                                        int layer) const;
   void pin_corridor();
   [[nodiscard]] bool leads_on(std::size_t tile) const;
+  [[nodiscard]] bool is_of_ramp(std::size_t tile, const Eigen::Vector2i& step) const;
   void join_seen();
   void go_under();
   void fill_unseen();

@@ -1,6 +1,6 @@
 #include "odometry/visual/marginalisation.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -120,23 +120,15 @@ LinearRows eliminate(const LinearRows& rows, const std::vector<int>& gone,
 LinearRows square_root(const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
   // What rounding leaves of a direction without information, relative to the best one.
   constexpr double kNothing = 1e-13;
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(H);
-  const Eigen::VectorXd D = ldlt.vectorD();
-  const double least = kNothing * std::max(D.maxCoeff(), 1e-300);
-  const Eigen::MatrixXd L = ldlt.matrixL();
-  const Eigen::MatrixXd P = ldlt.transpositionsP() * Eigen::MatrixXd::Identity(H.rows(), H.cols());
-  const Eigen::MatrixXd LtP = L.transpose() * P;
-  const Eigen::VectorXd y = L.triangularView<Eigen::UnitLower>().solve(Eigen::VectorXd(P * g));
-  LinearRows out{Eigen::MatrixXd(H.rows(), H.cols()), Eigen::VectorXd(H.rows())};
-  Eigen::Index count = 0;
-  for (Eigen::Index i = 0; i < D.size(); ++i) {
-    if (!(D[i] > least)) continue;
-    out.J.row(count) = std::sqrt(D[i]) * LtP.row(i);
-    out.r[count++] = y[i] / std::sqrt(D[i]);
-  }
-  out.J.conservativeResize(count, Eigen::NoChange);
-  out.r.conservativeResize(count);
-  return out;
+  // Not by Cholesky: Eigen's LDLT pivots by the diagonal as it was given, meets pivots that are
+  // nothing but rounding, and makes much of them.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(H);
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const double least = kNothing * std::max(values[values.size() - 1], 1e-300);
+  const Eigen::Index count = (values.array() > least).count();
+  const auto known = eigen.eigenvectors().rightCols(count);
+  const Eigen::VectorXd root = values.tail(count).cwiseSqrt();
+  return {root.asDiagonal() * known.transpose(), (known.transpose() * g).cwiseQuotient(root)};
 }
 
 void marginalise_oldest(Window& window, const WindowNoise& noise) {

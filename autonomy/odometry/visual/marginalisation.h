@@ -14,7 +14,7 @@ namespace arex {
 [[nodiscard]] LinearRows eliminate(const LinearRows& rows, const std::vector<int>& gone,
                                    const std::vector<int>& kept);
 
-/// Rows with J'J = H and J'r = g, by pivoted L D L'; directions without information are left out.
+/// Rows with J'J = H and J'r = g, by eigenvectors; directions without information are left out.
 /// @param H symmetric, positive semidefinite
 [[nodiscard]] LinearRows square_root(const Eigen::MatrixXd& H, const Eigen::VectorXd& g);
 

@@ -232,6 +232,30 @@ TEST(FloorSheet, GoesOnDownARampAndNotAcrossIt) {
   for (int y = 0; y < kHeight; ++y) EXPECT_GT(height(sheet, 10, y), ramp(84, 84) - 6) << y;
 }
 
+// Where rays do not reach, below and behind the vehicle, what is there is its neighbours' floor:
+// the foot of something, which slopes as a ramp does, leads nowhere down.
+TEST(FloorSheet, TakesNoSlopingFootForARamp) {
+  FloorSheet sheet = make_sheet();
+  Site site;
+  const auto unseen = [](int x, int y) { return x >= 16 && x < 32 && y >= 40 && y < 100; };
+  for (int y = 0; y < 160; ++y) {
+    for (int x = 0; x < 240; ++x) {
+      if (!unseen(x, y)) site.at(x, y).push_back(0);
+    }
+  }
+  site.add(24, 32, 40, 48, [](int, int y) { return -0.5 * (y - 39.5); });
+  site.give_to(sheet);
+  sheet.note_place({3, 10}, 13);
+  sheet.spread();
+  ASSERT_LT(sheet.plane(tile(3, 5))->rise.y(), -0.35);
+  for (int x = 2; x < 5; ++x) {
+    for (int y = 6; y < 13; ++y) EXPECT_NEAR(height(sheet, x, y), 0, 7) << x << " " << y;
+  }
+  for (int t = 0; t < kWidth * kHeight; ++t) {
+    EXPECT_EQ(sheet.brinks(static_cast<std::size_t>(t)), 0U) << t % kWidth << " " << t / kWidth;
+  }
+}
+
 // Where a ramp is seen at a grazing angle few of its columns are.
 TEST(FloorSheet, KnowsTheSlopeOfARampOfWhichLittleIsSeen) {
   const double slope = std::tan(M_PI / 6);

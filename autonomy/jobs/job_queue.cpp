@@ -15,9 +15,12 @@ double thread_seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
+// CPU time that others spent on pieces of this thread's job.
+thread_local double helped_seconds = 0;
+
 }  // namespace
 
-JobQueue::JobQueue(int threads) {
+JobQueue::JobQueue(int threads) : threads_(std::max(threads, 1)) {
   try {
     for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { run_worker(); });
   } catch (...) {
@@ -122,13 +125,59 @@ std::vector<JobQueue::LaneTiming> JobQueue::timings() const {
 
 void JobQueue::execute(Job& job) {
   const double begin = thread_seconds();
+  helped_seconds = 0;
   try {
     job.delivery = job.work();
   } catch (...) {
     job.error = std::current_exception();
   }
   job.work = nullptr;  // lets go of its inputs
-  job.seconds = static_cast<float>(thread_seconds() - begin);
+  job.seconds = static_cast<float>(thread_seconds() - begin + helped_seconds);
+}
+
+void JobQueue::split(std::size_t count, const std::function<void(std::size_t)>& piece) {
+  if (threads_ == 1) {
+    in_turn(count, piece);
+    return;
+  }
+  Pieces pieces{piece, count};
+  std::unique_lock lock(mutex_);
+  splits_.push_back(&pieces);
+  work_available_.notify_all();
+  job_done_.notify_all();
+  while (pieces.begun < count) do_piece(lock, pieces, false);
+  job_done_.wait(lock, [&] { return pieces.done == count; });
+  splits_.erase(std::find(splits_.begin(), splits_.end(), &pieces));
+  helped_seconds += pieces.others_s;
+  if (pieces.error) std::rethrow_exception(pieces.error);
+}
+
+// Does the next piece on this thread. @param helps whether it is another's job
+void JobQueue::do_piece(std::unique_lock<std::mutex>& lock, Pieces& pieces, bool helps) {
+  const std::size_t i = pieces.begun++;
+  lock.unlock();
+  const double begin = thread_seconds();
+  std::exception_ptr error;
+  try {
+    pieces.piece(i);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  const double seconds = thread_seconds() - begin;
+  lock.lock();
+  if (error && (!pieces.error || i < pieces.thrown_by)) {
+    pieces.error = error;
+    pieces.thrown_by = i;
+  }
+  if (helps) pieces.others_s += seconds;
+  if (++pieces.done == pieces.count) job_done_.notify_all();
+}
+
+// Pieces of a job under way that nobody has begun.
+JobQueue::Pieces* JobQueue::next_pieces() const {
+  const auto open = std::find_if(splits_.begin(), splits_.end(),
+                                 [](const Pieces* p) { return p->begun < p->count; });
+  return open == splits_.end() ? nullptr : *open;
 }
 
 // Runs the next job of a lane on this thread.
@@ -160,10 +209,13 @@ std::optional<JobQueue::Lane> JobQueue::next_lane(double longest_s) const {
 
 // Waits for the first of the pending jobs. The caller's thread is one of the host threads: while
 // another one runs that job it takes the next, but none that is longer: the flight goes on when the
-// job is done, and with it the work for all threads.
+// job is done, and with it the work for all threads. Pieces of jobs under way come first: one of
+// them may be the awaited job's, and none is long.
 void JobQueue::finish(std::unique_lock<std::mutex>& lock, const Job& job) {
   while (!job.done) {
-    if (const auto lane = next_lane(lanes_[job.lane].mean_s())) {
+    if (Pieces* pieces = next_pieces()) {
+      do_piece(lock, *pieces, true);
+    } else if (const auto lane = next_lane(lanes_[job.lane].mean_s())) {
       run_one(lock, *lane);
     } else {
       job_done_.wait(lock);
@@ -174,7 +226,9 @@ void JobQueue::finish(std::unique_lock<std::mutex>& lock, const Job& job) {
 void JobQueue::run_worker() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
-    if (const auto lane = next_lane(std::numeric_limits<double>::infinity())) {
+    if (Pieces* pieces = next_pieces()) {
+      do_piece(lock, *pieces, true);
+    } else if (const auto lane = next_lane(std::numeric_limits<double>::infinity())) {
       run_one(lock, *lane);
     } else {
       work_available_.wait(lock);

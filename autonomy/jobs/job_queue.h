@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "jobs/split.h"
 #include "math/types.h"
 
 namespace arex {
@@ -55,6 +56,12 @@ class JobQueue {
   /// out while it exposes the next frame. It does not occupy the lane in simulated time.
   void schedule(Lane lane, Stamp visible_at, Work work);
 
+  /// Does a job's work in pieces, on every host thread that has nothing else to do; to be called by
+  /// jobs. Rethrows what a piece threw, the first of them. @see Split
+  void split(std::size_t count, const std::function<void(std::size_t)>& piece);
+
+  [[nodiscard]] int threads() const { return threads_; }
+
   /// Does light work at once on the caller's thread, only to have it timed with the rest: by the
   /// lane that `work` returns.
   void run(const std::function<Lane()>& work);
@@ -97,15 +104,28 @@ class JobQueue {
     }
   };
 
+  /// What a job does in pieces, while it waits for them.
+  struct Pieces {
+    const std::function<void(std::size_t)>& piece;
+    std::size_t count = 0, begun = 0, done = 0;
+    std::exception_ptr error = nullptr;
+    std::size_t thrown_by = 0;
+    double others_s = 0;  ///< CPU time of threads that are not the job's
+  };
+
   void enqueue(std::unique_lock<std::mutex>& lock, Lane lane, Stamp visible_at, Work work);
   static void execute(Job& job);
   void run_one(std::unique_lock<std::mutex>& lock, Lane lane);
   [[nodiscard]] std::optional<Lane> next_lane(double longest_s) const;
+  [[nodiscard]] Pieces* next_pieces() const;
+  void do_piece(std::unique_lock<std::mutex>& lock, Pieces& pieces, bool helps);
   void finish(std::unique_lock<std::mutex>& lock, const Job& job);
   void run_worker();
 
+  int threads_;
   std::vector<LaneState> lanes_;
   std::vector<JobPtr> pending_;  ///< not yet delivered, in delivery order
+  std::vector<Pieces*> splits_;  ///< of the jobs under way
   std::vector<std::thread> workers_;
   mutable std::mutex mutex_;
   std::condition_variable work_available_;

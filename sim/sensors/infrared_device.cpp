@@ -62,9 +62,14 @@ void InfraredDevice::expose(const Moment& moment) {
   const Stamp due = closed + from_seconds(config_.latency_s);
   jobs_.schedule(lane_, due, [this, shot]() -> JobQueue::Delivery {
     if (!pair_) {
-      pair_ = std::make_unique<InfraredPair>(config_, unit_, world_, scene_, X_BC_, seed_);
+      // Twice as many strips as threads: they do not all take as long.
+      const int strips = jobs_.threads() == 1 ? 1 : 2 * jobs_.threads();
+      pair_ = std::make_unique<InfraredPair>(config_, unit_, world_, scene_, X_BC_, seed_, strips);
     }
-    const std::shared_ptr<StereoImage> image = pair_->capture(shot);
+    const auto split = [this](std::size_t count, const std::function<void(std::size_t)>& piece) {
+      jobs_.split(count, piece);
+    };
+    const std::shared_ptr<StereoImage> image = pair_->capture(shot, split);
     image->camera.X_BC = X_BC_drawn_;
     const double mean = central_mean(image->left, image->width, image->height);
     return [this, image, shot, mean, hash = hash_of(*image)] {

@@ -13,6 +13,7 @@ namespace arex::sim {
 namespace {
 
 constexpr float kFullScale = 255;
+constexpr std::size_t kPieces = 8;  // that an image's rows are divided in
 constexpr int kMostTaps = 48;
 constexpr float kLeastSmear = 0.25F;  // less changes nothing that noise and optics leave, px
 
@@ -48,8 +49,6 @@ InfraredImager::InfraredImager(const InfraredSensorConfig& config, const Pinhole
   for (int u = 0; u < camera.width; ++u) {
     column_x_.push_back(static_cast<float>((u - camera.cx) / camera.fx));
   }
-  way_u_.resize(column_x_.size());
-  way_v_.resize(column_x_.size());
   const double corner = camera.cx * camera.cx + camera.cy * camera.cy;
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
@@ -59,22 +58,36 @@ InfraredImager::InfraredImager(const InfraredSensorConfig& config, const Pinhole
   }
 }
 
+InfraredImager::Rows InfraredImager::rows_of(std::size_t piece) const {
+  const auto begin = [this](std::size_t i) {
+    return static_cast<int>(i) * camera_.height / static_cast<int>(kPieces);
+  };
+  return {begin(piece), begin(piece + 1)};
+}
+
 void InfraredImager::expose(const InfraredScene& scene, const InfraredExposure& exposure,
                             const CameraTwist& twist, std::uint64_t seed,
-                            std::vector<std::uint8_t>& grey) {
-  if (config_.motion_blur) {
-    smear(scene, exposure.exposure_s, twist);
-  } else {
-    smeared_ = scene.light_lx;
+                            std::vector<std::uint8_t>& grey, const Split& split) {
+  for (std::vector<float>* image : {&smeared_, &rows_, &spread_}) {
+    image->resize(scene.light_lx.size());
   }
-  spread();
-  read(exposure, seed, grey);
+  grey.resize(scene.light_lx.size());
+  split(kPieces, [&](std::size_t piece) {
+    const Rows rows = rows_of(piece);
+    if (config_.motion_blur) smear(scene, exposure.exposure_s, twist, rows);
+    spread_along_rows(config_.motion_blur ? smeared_ : scene.light_lx, rows);
+  });
+  split(kPieces, [&](std::size_t piece) {
+    const Rows rows = rows_of(piece);
+    spread_along_columns(rows);
+    read(exposure, seed, rows, grey);
+  });
 }
 
 /// How far the images of a row's surfaces go while the shutter is open, px: image_velocity() in
 /// single precision, its constants taken out of the loop.
 void InfraredImager::find_ways(const InfraredScene& scene, int v, double exposure_s,
-                               const CameraTwist& twist) {
+                               const CameraTwist& twist, Ways& ways) const {
   const auto f = static_cast<float>(exposure_s);
   const float scale_u = f * static_cast<float>(camera_.fx);
   const float scale_v = f * static_cast<float>(camera_.fy);
@@ -83,10 +96,11 @@ void InfraredImager::find_ways(const InfraredScene& scene, int v, double exposur
   const float along_v = y * vel.z() - vel.y(), turn_v = (1 + y * y) * w.x();
   const float slope_u = y * w.x(), slope_v = -(y * w.y() + w.z()), turn_u = y * w.z() - w.y();
   const float* q = &scene.inverse_depth[size(v) * size(camera_.width)];
+  float *way_u = ways.u.data(), *way_v = ways.v.data();
   for (std::size_t u = 0; u < size(camera_.width); ++u) {
     const float x = column_x_[u];
-    way_u_[u] = scale_u * (q[u] * (x * vel.z() - vel.x()) + x * (slope_u - x * w.y()) + turn_u);
-    way_v_[u] = scale_v * (q[u] * along_v + turn_v + x * slope_v);
+    way_u[u] = scale_u * (q[u] * (x * vel.z() - vel.x()) + x * (slope_u - x * w.y()) + turn_u);
+    way_v[u] = scale_v * (q[u] * along_v + turn_v + x * slope_v);
   }
 }
 
@@ -114,10 +128,11 @@ float InfraredImager::mean_along(const std::vector<float>& in, int u, int v, flo
 }
 
 /// The same of eight pixels from (u, v) on, each along its own way.
-Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int v) const {
+Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int v,
+                                        const Ways& ways) const {
   Float8 du, dv;
-  std::memcpy(&du, &way_u_[size(u)], sizeof du);
-  std::memcpy(&dv, &way_v_[size(u)], sizeof dv);
+  std::memcpy(&du, &ways.u[size(u)], sizeof du);
+  std::memcpy(&dv, &ways.v[size(u)], sizeof dv);
   const Float8 zero{}, across = du < 0 ? -du : du, along = dv < 0 ? -dv : dv;
   const Float8 length = across < along ? along : across;
   const Int8 wanted = __builtin_convertvector(length, Int8) + 2;
@@ -151,29 +166,31 @@ Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int
 }
 
 /// Each pixel takes the mean of the light along the way that its own surface's image goes.
-void InfraredImager::smear(const InfraredScene& scene, double exposure_s,
-                           const CameraTwist& twist) {
+void InfraredImager::smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist,
+                           const Rows& rows) {
   const int w = camera_.width;
-  smeared_ = scene.light_lx;
-  for (int v = 0; v < camera_.height; ++v) {
-    find_ways(scene, v, exposure_s, twist);
+  Ways ways{std::vector<float>(column_x_.size()), std::vector<float>(column_x_.size())};
+  for (int v = rows.first; v < rows.end; ++v) {
+    find_ways(scene, v, exposure_s, twist, ways);
+    const float* in = &scene.light_lx[size(v) * size(w)];
     float* out = &smeared_[size(v) * size(w)];
+    std::copy(in, in + w, out);
     const auto moves = [&](int u) {
-      return !(std::max(std::abs(way_u_[size(u)]), std::abs(way_v_[size(u)])) < kLeastSmear);
+      return !(std::max(std::abs(ways.u[size(u)]), std::abs(ways.v[size(u)])) < kLeastSmear);
     };
     for (int u = 0; u < w;) {
       if (u + 8 <= w) {
         std::array<bool, 8> moved{};
         for (int i = 0; i < 8; ++i) moved[size(i)] = moves(u + i);
         if (std::find(moved.begin(), moved.end(), true) != moved.end()) {
-          const Float8 mean = mean_along_eight(scene.light_lx, u, v);
+          const Float8 mean = mean_along_eight(scene.light_lx, u, v, ways);
           for (int i = 0; i < 8; ++i) out[u + i] = moved[size(i)] ? mean[i] : out[u + i];
         }
         u += 8;
         continue;
       }
       if (moves(u)) {
-        out[u] = mean_along(scene.light_lx, u, v, way_u_[size(u)], way_v_[size(u)]);
+        out[u] = mean_along(scene.light_lx, u, v, ways.u[size(u)], ways.v[size(u)]);
       }
       ++u;
     }
@@ -181,20 +198,24 @@ void InfraredImager::smear(const InfraredScene& scene, double exposure_s,
 }
 
 /// The optics' kernel: a, 1 - 2a, a along rows, then along columns.
-void InfraredImager::spread() {
-  const int w = camera_.width, h = camera_.height;
+void InfraredImager::spread_along_rows(const std::vector<float>& in_all, const Rows& rows) {
+  const int w = camera_.width;
   const auto a = static_cast<float>(config_.blur_kernel);
   const float centre = 1 - 2 * a;
-  rows_.resize(smeared_.size());
-  spread_.resize(smeared_.size());
-  for (int v = 0; v < h; ++v) {
-    const float* in = &smeared_[size(v) * size(w)];
+  for (int v = rows.first; v < rows.end; ++v) {
+    const float* in = &in_all[size(v) * size(w)];
     float* out = &rows_[size(v) * size(w)];
     out[0] = (centre + a) * in[0] + a * in[1];
     for (int u = 1; u < w - 1; ++u) out[u] = centre * in[u] + a * (in[u - 1] + in[u + 1]);
     out[w - 1] = (centre + a) * in[w - 1] + a * in[w - 2];
   }
-  for (int v = 0; v < h; ++v) {
+}
+
+void InfraredImager::spread_along_columns(const Rows& rows) {
+  const int w = camera_.width, h = camera_.height;
+  const auto a = static_cast<float>(config_.blur_kernel);
+  const float centre = 1 - 2 * a;
+  for (int v = rows.first; v < rows.end; ++v) {
     const float* in = &rows_[size(v) * size(w)];
     const float* above = v > 0 ? in - w : in;
     const float* below = v + 1 < h ? in + w : in;
@@ -203,8 +224,8 @@ void InfraredImager::spread() {
   }
 }
 
-void InfraredImager::read(const InfraredExposure& exposure, std::uint64_t seed,
-                          std::vector<std::uint8_t>& grey) {
+void InfraredImager::read(const InfraredExposure& exposure, std::uint64_t seed, const Rows& rows,
+                          std::vector<std::uint8_t>& grey) const {
   const auto electrons_per_lx =
       static_cast<float>(config_.sensitivity_e_per_lx_s * exposure.exposure_s);
   const auto grey_per_electron =
@@ -213,8 +234,8 @@ void InfraredImager::read(const InfraredExposure& exposure, std::uint64_t seed,
   const auto read_variance = static_cast<float>(config_.read_noise_e * config_.read_noise_e);
   const float noise = config_.noise_free ? 0.0F : 1.0F;
   const auto base = static_cast<std::uint32_t>(mix_bits(seed));
-  grey.resize(spread_.size());
-  for (std::size_t i = 0; i < grey.size(); ++i) {
+  const std::size_t end = size(rows.end) * size(camera_.width);
+  for (std::size_t i = size(rows.first) * size(camera_.width); i < end; ++i) {
     const float light = spread_[i] * vignette_[i] * electrons_per_lx;
     const float electrons = light < full_well ? light : full_well;
     const float sigma = std::sqrt(electrons + read_variance) * noise;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "jobs/split.h"
 #include "messages/sensors.h"
 #include "sensors/eight.h"
 #include "sensors/infrared_config.h"
@@ -27,25 +28,39 @@ class InfraredImager {
   /// @param seed of this eye and frame
   /// @param grey resized to width * height
   void expose(const InfraredScene& scene, const InfraredExposure& exposure,
-              const CameraTwist& twist, std::uint64_t seed, std::vector<std::uint8_t>& grey);
+              const CameraTwist& twist, std::uint64_t seed, std::vector<std::uint8_t>& grey,
+              const Split& split = in_turn);
 
   /// The smeared and spread light that the pixels of the last frame received, lx.
   [[nodiscard]] const std::vector<float>& received() const { return spread_; }
 
  private:
-  void smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist);
-  void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist);
+  /// Rows from the first up to the end.
+  struct Rows {
+    int first = 0, end = 0;
+  };
+  /// How far images of a row's surfaces go while the shutter is open, px.
+  struct Ways {
+    std::vector<float> u, v;
+  };
+  [[nodiscard]] Rows rows_of(std::size_t piece) const;
+  void smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist,
+             const Rows& rows);
+  void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist,
+                 Ways& ways) const;
   [[nodiscard]] float mean_along(const std::vector<float>& in, int u, int v, float du,
                                  float dv) const;
-  [[nodiscard]] Float8 mean_along_eight(const std::vector<float>& in, int u, int v) const;
-  void spread();
-  void read(const InfraredExposure& exposure, std::uint64_t seed, std::vector<std::uint8_t>& grey);
+  [[nodiscard]] Float8 mean_along_eight(const std::vector<float>& in, int u, int v,
+                                        const Ways& ways) const;
+  void spread_along_rows(const std::vector<float>& in, const Rows& rows);
+  void spread_along_columns(const Rows& rows);
+  void read(const InfraredExposure& exposure, std::uint64_t seed, const Rows& rows,
+            std::vector<std::uint8_t>& grey) const;
 
   InfraredSensorConfig config_;
   PinholeCamera camera_;
-  std::vector<float> vignette_;       ///< share of the light that comes through, of each pixel
-  std::vector<float> column_x_;       ///< (u - cx) / fx
-  std::vector<float> way_u_, way_v_;  ///< of a row's pixels, px
+  std::vector<float> vignette_;  ///< share of the light that comes through, of each pixel
+  std::vector<float> column_x_;  ///< (u - cx) / fx
   std::vector<float> smeared_, rows_, spread_;
 };
 

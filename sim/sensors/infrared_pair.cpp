@@ -7,13 +7,13 @@ namespace arex::sim {
 
 InfraredPair::InfraredPair(const InfraredConfig& config, const D430Config& unit,
                            const worlds::World& world, const Scene& scene, const Pose& X_BC,
-                           std::uint64_t seed)
+                           std::uint64_t seed, int strips)
     : config_(config),
       camera_(unit.camera()),
       baseline_m_(unit.baseline_m),
       X_BC_(X_BC),
       seed_(seed),
-      shader_(config.light, world, scene, camera_),
+      shader_(config.light, world, scene, camera_, strips),
       imager_(config.sensor, camera_) {
   if (!config.mount_error_rad.isZero(0)) X_BC_.R = X_BC.R * so3::Exp(config.mount_error_rad);
 }
@@ -25,13 +25,13 @@ CameraTwist InfraredPair::twist(const InfraredShot& shot, const Pose& X_BE) cons
 }
 
 void InfraredPair::take(const InfraredShot& shot, const Pose& X_BE, std::uint64_t eye,
-                        InfraredScene& scene, std::vector<std::uint8_t>& grey) {
-  shader_.draw(shot.X_WB * X_BE, scene);
+                        const Split& split, InfraredScene& scene, std::vector<std::uint8_t>& grey) {
+  shader_.draw(shot.X_WB * X_BE, scene, split);
   RandomStream frame = RandomStream(seed_, "infrared").fork(static_cast<std::uint64_t>(shot.stamp));
-  imager_.expose(scene, shot.exposure, twist(shot, X_BE), frame.fork(eye).bits(), grey);
+  imager_.expose(scene, shot.exposure, twist(shot, X_BE), frame.fork(eye).bits(), grey, split);
 }
 
-std::shared_ptr<StereoImage> InfraredPair::capture(const InfraredShot& shot) {
+std::shared_ptr<StereoImage> InfraredPair::capture(const InfraredShot& shot, const Split& split) {
   auto image = std::make_shared<StereoImage>();
   image->time_ns = shot.stamp + from_seconds(config_.clock_offset_s);
   image->width = camera_.width;
@@ -40,10 +40,10 @@ std::shared_ptr<StereoImage> InfraredPair::capture(const InfraredShot& shot) {
   image->gain = shot.exposure.gain;
   image->camera = {camera_.width, camera_.height, camera_.fx, camera_.cx,
                    camera_.cy,    baseline_m_,    {}};
-  take(shot, X_BC_, 0, left_, image->left);
+  take(shot, X_BC_, 0, split, left_, image->left);
   if (shot.right) {
     const Pose X_CR{Mat3::Identity(), Vec3(baseline_m_, 0, 0)};
-    take(shot, X_BC_ * X_CR, 1, right_, image->right);
+    take(shot, X_BC_ * X_CR, 1, split, right_, image->right);
   }
   return image;
 }

@@ -23,11 +23,13 @@ namespace arex::sim {
 class InfraredPair {
  public:
   /// @param unit the depth camera as built, whose left imager this is
+  /// @param strips that a picture may be drawn in side by side; how many they are changes no bit
   /// The world is copied; neither it nor the scene need outlive this.
   InfraredPair(const InfraredConfig& config, const D430Config& unit, const worlds::World& world,
-               const Scene& scene, const Pose& X_BC, std::uint64_t seed);
+               const Scene& scene, const Pose& X_BC, std::uint64_t seed, int strips = 1);
 
-  [[nodiscard]] std::shared_ptr<StereoImage> capture(const InfraredShot& shot);
+  [[nodiscard]] std::shared_ptr<StereoImage> capture(const InfraredShot& shot,
+                                                     const Split& split = in_turn);
 
   [[nodiscard]] const InfraredShader& shader() const { return shader_; }
   /// The light that the left eye's last frame was made of.
@@ -36,8 +38,8 @@ class InfraredPair {
 
  private:
   [[nodiscard]] CameraTwist twist(const InfraredShot& shot, const Pose& X_BE) const;
-  void take(const InfraredShot& shot, const Pose& X_BE, std::uint64_t eye, InfraredScene& scene,
-            std::vector<std::uint8_t>& grey);
+  void take(const InfraredShot& shot, const Pose& X_BE, std::uint64_t eye, const Split& split,
+            InfraredScene& scene, std::vector<std::uint8_t>& grey);
 
   InfraredConfig config_;
   PinholeCamera camera_;

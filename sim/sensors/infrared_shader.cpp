@@ -25,7 +25,7 @@ std::vector<Lamp> lit(const InfraredLightConfig& light, const std::vector<Lamp>&
 }  // namespace
 
 InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::World& world,
-                               const Scene& scene, const PinholeCamera& camera)
+                               const Scene& scene, const PinholeCamera& camera, int strips)
     : camera_(camera),
       fine_(finer(camera, kSamples)),
       lamps_(lit(light, find_lamps(world, scene))),
@@ -34,24 +34,34 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
       sun_lx_(light.sun ? static_cast<float>(light.sun_lx) : 0),
       surfaces_(world, lamps_, grid_, sun_, sun_lx_),
       backdrop_(light, world),
-      renderer_(world, fine_, renderer_options(light)),
+      renderer_(world, fine_, renderer_options(light, strips)),
       lamp_lx_(static_cast<float>(light.lamp_flux_lm / kStripArea)),
       pixel_rad_(static_cast<float>(1 / camera.fx)),
       off_surface_m_(static_cast<float>(0.6 * grid_.spacing_m())) {
-  for (int u = 0; u < camera.width; ++u) {
-    column_x_.push_back(static_cast<float>((u - camera.cx) / camera.fx));
+  for (std::size_t i = 0; i < renderer_.strips(); ++i) strips_.push_back(make_strip(i));
+}
+
+InfraredShader::Strip InfraredShader::make_strip(std::size_t index) const {
+  const Renderer::Columns samples = renderer_.columns(index);
+  Strip strip;
+  strip.index = index;
+  strip.first = static_cast<std::size_t>(samples.first / kSamples);
+  const auto width = static_cast<std::size_t>(samples.count / kSamples);
+  for (std::size_t u = strip.first; u < strip.first + width; ++u) {
+    strip.column_x.push_back(
+        static_cast<float>((static_cast<double>(u) - camera_.cx) / camera_.fx));
   }
-  for (std::vector<float>& axis : row_rays_W_) axis.resize(column_x_.size());
-  const auto width = static_cast<std::size_t>(camera.width);
-  band_inverse_depth_.resize(kSamples * kSamples * kBand * width);
-  band_triangles_.resize(band_inverse_depth_.size());
-  queues_.resize(surfaces_.kinds() + 1);
-  mixtures_.resize(kBand * width);
+  for (std::vector<float>& axis : strip.row_rays_W) axis.resize(width);
+  strip.band_inverse_depth.resize(kSamples * kSamples * kBand * width);
+  strip.band_triangles.resize(strip.band_inverse_depth.size());
+  strip.queues.resize(surfaces_.kinds() + 1);
+  strip.mixtures.resize(kBand * width);
+  return strip;
 }
 
 /// @param u the first of them, @param q their inverse depths
-void InfraredShader::eight_pixels(const View& view, std::size_t u, std::uint32_t triangle,
-                                  const Float8& q, float* light) const {
+void InfraredShader::eight_pixels(const View& view, const Strip& strip, std::size_t u,
+                                  std::uint32_t triangle, const Float8& q, float* light) const {
   const SurfaceFacet& facet = surfaces_.facet(triangle);
   const Material& material = surfaces_.material(facet);
   const Float8 z = 1 / q;
@@ -59,7 +69,7 @@ void InfraredShader::eight_pixels(const View& view, std::size_t u, std::uint32_t
   Float8 towards{}, squared{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<Eigen::Index>(axis);
-    ray[axis] = load_eight(&row_rays_W_[axis][u]);
+    ray[axis] = load_eight(&strip.row_rays_W[axis][u]);
     p[axis] = view.eye_W[k] + z * ray[axis];
     towards += facet.normal_W[k] * ray[axis];
     squared += ray[axis] * ray[axis];
@@ -101,12 +111,12 @@ void InfraredShader::eight_pixels(const View& view, std::size_t u, std::uint32_t
 
 /// Notes what a pixel of several surfaces shows: each of its triangles once, in the middle of its
 /// samples. @param ray_W the pixel's
-void InfraredShader::split_pixel(const View& view, const Vec3f& ray_W,
+void InfraredShader::split_pixel(const View& view, Strip& strip, const Vec3f& ray_W,
                                  const std::array<std::uint32_t, 4>& seen,
-                                 const std::array<float, 4>& q, float* light) {
+                                 const std::array<float, 4>& q, float* light) const {
   constexpr std::array<float, 4> kBeside{-0.25F, 0.25F, -0.25F, 0.25F};
   constexpr std::array<float, 4> kBelow{-0.25F, -0.25F, 0.25F, 0.25F};
-  Mixture& mixture = mixtures_[mixed_++];
+  Mixture& mixture = strip.mixtures[strip.mixed++];
   mixture.pixel = light;
   mixture.surfaces = 0;
   std::array<bool, 4> done{};
@@ -124,28 +134,28 @@ void InfraredShader::split_pixel(const View& view, const Vec3f& ray_W,
     const float share = 1 / count, pixel = share * pixel_rad_;
     const Vec3f ray = ray_W + pixel * beside * view.right_W + pixel * below * view.down_W;
     mixture.samples[mixture.surfaces] = count;
-    show(view, seen[i], ray, share * depth, &mixture.light_lx[mixture.surfaces++]);
+    show(view, strip.queues, seen[i], ray, share * depth, &mixture.light_lx[mixture.surfaces++]);
   }
 }
 
 /// @param depths of the row's samples, first its upper ones, @param triangles theirs
-void InfraredShader::draw_row(const View& view, int v, const float* depths,
-                              const std::uint32_t* triangles, InfraredScene& out) {
-  const auto width = static_cast<std::size_t>(camera_.width);
+void InfraredShader::draw_row(const View& view, Strip& strip, int v, const float* depths,
+                              const std::uint32_t* triangles, InfraredScene& out) const {
+  const std::size_t width = strip.column_x.size();
+  std::array<std::vector<float>, 3>& rays_W = strip.row_rays_W;
   const Vec3f row_W =
       static_cast<float>((v - camera_.cy) / camera_.fy) * view.down_W + view.ahead_W;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
     for (std::size_t u = 0; u < width; ++u) {
-      row_rays_W_[k][u] = row_W[axis] + column_x_[u] * view.right_W[axis];
+      rays_W[k][u] = row_W[axis] + strip.column_x[u] * view.right_W[axis];
     }
   }
-  const auto ray = [&](std::size_t u) {
-    return Vec3f(row_rays_W_[0][u], row_rays_W_[1][u], row_rays_W_[2][u]);
-  };
+  const auto ray = [&](std::size_t u) { return Vec3f(rays_W[0][u], rays_W[1][u], rays_W[2][u]); };
   const float* below = depths + kSamples * width;
   const std::uint32_t* triangles_below = triangles + kSamples * width;
-  const std::size_t row = static_cast<std::size_t>(v) * width;
+  const std::size_t row =
+      static_cast<std::size_t>(v) * static_cast<std::size_t>(camera_.width) + strip.first;
   float* light = &out.light_lx[row];
   float* inverse_depth = &out.inverse_depth[row];
   const auto one_pixel = [&](std::size_t u) {
@@ -155,9 +165,9 @@ void InfraredShader::draw_row(const View& view, int v, const float* depths,
     const std::array<float, 4> q{depths[i], depths[i + 1], below[i], below[i + 1]};
     inverse_depth[u] = 0.25F * ((q[0] + q[1]) + (q[2] + q[3]));
     if (seen[0] == seen[1] && seen[0] == seen[2] && seen[0] == seen[3]) {
-      show(view, seen[0], ray(u), inverse_depth[u], light + u);
+      show(view, strip.queues, seen[0], ray(u), inverse_depth[u], light + u);
     } else {
-      split_pixel(view, ray(u), seen, q, light + u);
+      split_pixel(view, strip, ray(u), seen, q, light + u);
     }
   };
   std::size_t u = 0;
@@ -181,7 +191,7 @@ void InfraredShader::draw_row(const View& view, int v, const float* depths,
                                    (Int8)(first == seen(triangles_below, std::true_type{})));
     if (same == 0xFFU && first[0] != Renderer::kNoTriangle &&
         lanes_of((Int8)(first == first[0] - Uint8{})) == 0xFFU) {
-      eight_pixels(view, u, first[0], q, light + u);
+      eight_pixels(view, strip, u, first[0], q, light + u);
       continue;
     }
     for (std::size_t i = 0; i < 8; ++i) one_pixel(u + i);
@@ -189,18 +199,21 @@ void InfraredShader::draw_row(const View& view, int v, const float* depths,
   for (; u < width; ++u) one_pixel(u);
 }
 
-void InfraredShader::draw_band(const View& view, int v_first, InfraredScene& out) {
+void InfraredShader::draw_band(const View& view, Strip& strip, int v_first,
+                               InfraredScene& out) const {
   const int rows = std::min(kBand, camera_.height - v_first);
-  renderer_.read_rows(kSamples * v_first, kSamples * rows, band_inverse_depth_.data(),
-                      band_triangles_.data());
-  mixed_ = 0;
+  float* depths = strip.band_inverse_depth.data();
+  std::uint32_t* triangles = strip.band_triangles.data();
+  renderer_.read_rows(strip.index, kSamples * v_first, kSamples * rows, depths, triangles);
+  strip.mixed = 0;
   for (int i = 0; i < rows; ++i) {
-    const std::size_t first = static_cast<std::size_t>(kSamples * i) * column_x_.size() * kSamples;
-    draw_row(view, v_first + i, &band_inverse_depth_[first], &band_triangles_[first], out);
+    const std::size_t first =
+        static_cast<std::size_t>(kSamples * i) * strip.column_x.size() * kSamples;
+    draw_row(view, strip, v_first + i, depths + first, triangles + first, out);
   }
-  for (std::size_t kind = 0; kind < queues_.size(); ++kind) shade(view, kind);
-  for (std::size_t i = 0; i < mixed_; ++i) {
-    const Mixture& mixture = mixtures_[i];
+  for (std::size_t kind = 0; kind < strip.queues.size(); ++kind) shade(view, strip.queues, kind);
+  for (std::size_t i = 0; i < strip.mixed; ++i) {
+    const Mixture& mixture = strip.mixtures[i];
     float total = 0;
     for (std::size_t k = 0; k < mixture.surfaces; ++k) {
       total += mixture.samples[k] * mixture.light_lx[k];
@@ -209,15 +222,20 @@ void InfraredShader::draw_band(const View& view, int v_first, InfraredScene& out
   }
 }
 
-void InfraredShader::draw(const Pose& X_WC, InfraredScene& out) {
-  renderer_.draw_triangles(X_WC);
+void InfraredShader::draw_strip(const View& view, Strip& strip, InfraredScene& out) {
+  renderer_.draw_strip(strip.index);
+  for (int v = 0; v < camera_.height; v += kBand) draw_band(view, strip, v, out);
+}
+
+void InfraredShader::draw(const Pose& X_WC, InfraredScene& out, const Split& split) {
+  renderer_.find_visible(X_WC);
   const Eigen::Matrix3f R = X_WC.R.cast<float>();
   const View view{X_WC.p.cast<float>(), R.col(0), R.col(1), R.col(2)};
   const std::size_t pixels =
       static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height);
   out.light_lx.resize(pixels);
   out.inverse_depth.resize(pixels);
-  for (int v = 0; v < camera_.height; v += kBand) draw_band(view, v, out);
+  split(strips_.size(), [&](std::size_t i) { draw_strip(view, strips_[i], out); });
 }
 
 }  // namespace arex::sim

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "jobs/split.h"
 #include "math/pose.h"
 #include "messages/sensors.h"
 #include "sensors/infrared_backdrop.h"
@@ -31,11 +32,12 @@ namespace arex::sim {
 class InfraredShader {
  public:
   /// The world is copied; it need not outlive the shader, nor need the scene.
+  /// @param strips that a picture may be drawn in; how many they are changes no bit
   InfraredShader(const InfraredLightConfig& light, const worlds::World& world, const Scene& scene,
-                 const PinholeCamera& camera);
+                 const PinholeCamera& camera, int strips = 1);
 
-  /// What is seen from X_WC. Callable from any thread, one at a time.
-  void draw(const Pose& X_WC, InfraredScene& out);
+  /// What is seen from X_WC, drawn in strips side by side. Callable from any thread, one at a time.
+  void draw(const Pose& X_WC, InfraredScene& out, const Split& split = in_turn);
 
   static constexpr int kSamples = 2;  ///< along each axis of a pixel
 
@@ -45,10 +47,13 @@ class InfraredShader {
   /// The pinhole of the samples.
   [[nodiscard]] const PinholeCamera& sample_camera() const { return fine_; }
   /// How they are drawn.
-  static RendererOptions renderer_options(const InfraredLightConfig& light) {
+  static RendererOptions renderer_options(const InfraredLightConfig& light, int strips = 1) {
+    // Eight pixels are shaded together: strips begin where eights do.
     return {.far_m = light.draw_range_m,
             .least_leaf_px = kSamples * light.least_leaf_px,
-            .least_width_px = kSamples * light.least_width_px};
+            .least_width_px = kSamples * light.least_width_px,
+            .strips = strips,
+            .strip_align_px = 8 * kSamples};
   }
 
  private:
@@ -89,28 +94,45 @@ class InfraredShader {
   /// Facets of eight triangles.
   struct EightFacets;
 
-  void draw_band(const View& view, int v_first, InfraredScene& out);
-  void draw_row(const View& view, int v, const float* depths, const std::uint32_t* triangles,
-                InfraredScene& out);
-  void eight_pixels(const View& view, std::size_t u, std::uint32_t triangle, const Float8& q,
-                    float* light) const;
-  void split_pixel(const View& view, const Vec3f& ray_W, const std::array<std::uint32_t, 4>& seen,
-                   const std::array<float, 4>& q, float* light);
+  /// A strip of the picture, and what shading it needs.
+  struct Strip {
+    std::size_t index = 0;                         ///< the renderer's
+    std::size_t first = 0;                         ///< of its columns of pixels
+    std::vector<float> column_x;                   ///< (u - cx) / fx
+    std::array<std::vector<float>, 3> row_rays_W;  ///< of a row's pixels, of depth 1 in C
+    std::vector<float> band_inverse_depth;         ///< of a band's samples
+    std::vector<std::uint32_t> band_triangles;
+    std::vector<Queue> queues;      ///< by kind, the last is the backdrop's
+    std::vector<Mixture> mixtures;  ///< of a band
+    std::size_t mixed = 0;          ///< of them
+  };
+  [[nodiscard]] Strip make_strip(std::size_t index) const;
+
+  void draw_strip(const View& view, Strip& strip, InfraredScene& out);
+  void draw_band(const View& view, Strip& strip, int v_first, InfraredScene& out) const;
+  void draw_row(const View& view, Strip& strip, int v, const float* depths,
+                const std::uint32_t* triangles, InfraredScene& out) const;
+  void eight_pixels(const View& view, const Strip& strip, std::size_t u, std::uint32_t triangle,
+                    const Float8& q, float* light) const;
+  void split_pixel(const View& view, Strip& strip, const Vec3f& ray_W,
+                   const std::array<std::uint32_t, 4>& seen, const std::array<float, 4>& q,
+                   float* light) const;
   /// Notes a surface. @param light where its light goes
-  void show(const View& view, std::uint32_t triangle, const Vec3f& ray_W, float inverse_depth,
-            float* light) {
+  void show(const View& view, std::vector<Queue>& queues, std::uint32_t triangle,
+            const Vec3f& ray_W, float inverse_depth, float* light) const {
     std::size_t kind = backdrop_kind();
     if (triangle != Renderer::kNoTriangle) {
       kind = surfaces_.kind(triangle);
       __builtin_prefetch(&surfaces_.facet(triangle));  // nobody can guess which comes next
     }
-    queues_[kind].add(light, triangle, ray_W, inverse_depth);
-    if (queues_[kind].count == Queue::kCapacity) shade(view, kind);
+    queues[kind].add(light, triangle, ray_W, inverse_depth);
+    if (queues[kind].count == Queue::kCapacity) shade(view, queues, kind);
   }
   [[nodiscard]] std::size_t backdrop_kind() const { return surfaces_.kinds(); }
-  void shade(const View& view, std::size_t kind);
-  /// Light of eight surfaces, from number `first` of a kind's queue on, as white ones', lx.
-  [[nodiscard]] Float8 eight_surfaces(const View& view, std::size_t kind, std::size_t first) const;
+  void shade(const View& view, std::vector<Queue>& queues, std::size_t kind) const;
+  /// Light of eight surfaces of a kind, from number `first` of its queue on, as white ones', lx.
+  [[nodiscard]] Float8 eight_surfaces(const View& view, const Queue& queue, std::size_t kind,
+                                      std::size_t first) const;
   [[nodiscard]] Float8 lit_alike(const EightFacets& facets, const Int8& from_behind) const;
   [[nodiscard]] Float8 lit_from_place_to_place(const Material& material, const EightFacets& facets,
                                                const Int8& from_behind,
@@ -132,13 +154,7 @@ class InfraredShader {
   Backdrop backdrop_;
   Renderer renderer_;
   float lamp_lx_ = 0, pixel_rad_ = 0, off_surface_m_ = 0;
-  std::vector<float> column_x_;                   ///< (u - cx) / fx
-  std::array<std::vector<float>, 3> row_rays_W_;  ///< of a row's pixels, of depth 1 in C
-  std::vector<float> band_inverse_depth_;         ///< of a band's samples
-  std::vector<std::uint32_t> band_triangles_;
-  std::vector<Queue> queues_;      ///< by kind, the last is the backdrop's
-  std::vector<Mixture> mixtures_;  ///< of a band
-  std::size_t mixed_ = 0;          ///< of them
+  std::vector<Strip> strips_;
 };
 
 }  // namespace arex::sim

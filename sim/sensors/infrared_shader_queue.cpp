@@ -93,8 +93,8 @@ Float8 InfraredShader::lit_from_place_to_place(const Material& material, const E
   return lux * facets.albedo;
 }
 
-Float8 InfraredShader::eight_surfaces(const View& view, std::size_t kind, std::size_t first) const {
-  const Queue& queue = queues_[kind];
+Float8 InfraredShader::eight_surfaces(const View& view, const Queue& queue, std::size_t kind,
+                                      std::size_t first) const {
   const Material& material = surfaces_.material_of_kind(kind);
   const EightFacets facets(surfaces_, &queue.triangle[first]);
   const Float8 z = 1 / load_eight(&queue.inverse_depth[first]);
@@ -127,13 +127,13 @@ Float8 InfraredShader::eight_surfaces(const View& view, std::size_t kind, std::s
 }
 
 /// Finds the light of what is collected of a kind.
-void InfraredShader::shade(const View& view, std::size_t kind) {
-  Queue& queue = queues_[kind];
+void InfraredShader::shade(const View& view, std::vector<Queue>& queues, std::size_t kind) const {
+  Queue& queue = queues[kind];
   queue.fill_up();
   for (std::size_t first = 0; first < queue.count; first += 8) {
     const Float8 light = kind == backdrop_kind()
                              ? backdrop_.at(view.eye_W, queue.rays(first), pixel_rad_)
-                             : eight_surfaces(view, kind, first);
+                             : eight_surfaces(view, queue, kind, first);
     for (int i = 0; i < 8; ++i) *queue.to[first + static_cast<std::size_t>(i)] = light[i];
   }
   queue.count = 0;

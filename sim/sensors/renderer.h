@@ -21,6 +21,10 @@ struct RendererOptions {
   double least_leaf_px = 0;
   /// Solids that would look thinner are left out; 0: none.
   double least_width_px = 0;
+  /// What surfaces are drawn in, side by side, each as wide as the others but for the last; strips
+  /// begin at multiples of strip_align_px. How many they are changes no bit.
+  int strips = 1;
+  int strip_align_px = 1;
 };
 
 /// What a pinhole camera sees of a world: a depth rasteriser on the CPU.
@@ -38,7 +42,7 @@ class Renderer {
 
   struct Statistics {
     std::size_t chunks = 0;
-    std::size_t triangles = 0;
+    std::size_t triangles = 0;  ///< what lies in two strips counts twice
   };
 
   /// The world must outlive the renderer: what is looked at first is prepared then.
@@ -56,10 +60,20 @@ class Renderer {
   /// is nothing. Of two in the same place it is the one drawn first, which the pose decides.
   void render_triangles(const Pose& X_WC, std::vector<float>& inverse_depth,
                         std::vector<std::uint32_t>& triangles);
-  /// The same for who wants to read it row by row: what it draws stays until the next picture.
-  void draw_triangles(const Pose& X_WC);
-  /// Of draw_triangles(), `count` rows from v on, one behind the other.
-  void read_rows(int v, int count, float* inverse_depth, std::uint32_t* triangles) const;
+  /// The same in strips, for who wants to read it row by row. Find what is visible first, then draw
+  /// the strips; those may be drawn and read from several threads, each from one at a time. What is
+  /// drawn stays until the next picture.
+  void find_visible(const Pose& X_WC);
+  void draw_strip(std::size_t strip);
+  /// The columns of a strip.
+  struct Columns {
+    int first = 0, count = 0;
+  };
+  [[nodiscard]] std::size_t strips() const;
+  [[nodiscard]] Columns columns(std::size_t strip) const;
+  /// Of a drawn strip, `count` rows from v on, one behind the other.
+  void read_rows(std::size_t strip, int v, int count, float* inverse_depth,
+                 std::uint32_t* triangles) const;
 
   /// What the last frame drew.
   [[nodiscard]] Statistics last_frame() const;

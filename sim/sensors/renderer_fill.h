@@ -70,11 +70,13 @@ class TiledPicture {
  public:
   static constexpr int kSide = kLanes;  ///< of a tile, px
 
-  explicit TiledPicture(const PinholeCamera& camera) : camera_(camera) {
-    columns_ = static_cast<std::size_t>((camera.width + kSide - 1) / kSide);
+  /// Of a camera's picture the columns from u_first on.
+  TiledPicture(const PinholeCamera& camera, int u_first, int width)
+      : camera_(camera), u_first_(u_first), width_(width) {
+    columns_ = static_cast<std::size_t>((width + kSide - 1) / kSide);
     rows_ = static_cast<std::size_t>((camera.height + kSide - 1) / kSide);
     for (int u = 0; u < static_cast<int>(columns_ + kLanes) * kSide; ++u) {
-      ray_x_.push_back((u - camera.cx) / camera.fx);
+      ray_x_.push_back((u_first + u - camera.cx) / camera.fx);
     }
     for (int v = 0; v < static_cast<int>(rows_ + kLanes) * kSide; ++v) {
       ray_y_.push_back((v - camera.cy) / camera.fy);
@@ -96,6 +98,7 @@ class TiledPicture {
   }
 
   /// Draws a triangle where it covers a pixel's centre within the box and nothing drawn is as near.
+  /// @param box in this picture's own columns
   /// @param most 1/z of the nearest that is drawn, 1/m
   void fill(const Footprint& footprint, const PixelBox& box, double most, std::uint32_t triangle) {
     const std::size_t left = static_cast<std::size_t>(box.u_first) / kSide * kSide;
@@ -122,7 +125,7 @@ class TiledPicture {
     const auto within = static_cast<std::size_t>(v % kSide * kSide);
     for (std::size_t i = 0; i < columns_; ++i) {
       const Tile& tile = least_[first + i] == kUntouched ? kNothing : tiles_[first + i];
-      const int count = std::min(kSide, camera_.width - static_cast<int>(i) * kSide);
+      const int count = std::min(kSide, width_ - static_cast<int>(i) * kSide);
       if constexpr (with_triangles) {
         visit(&tile.inverse_depth[within], &tile.triangle[within], count);
       } else {
@@ -199,7 +202,7 @@ class TiledPicture {
         for (int i = 0; i < 3; ++i) {
           const std::array<double, kLanes>& values = y[static_cast<std::size_t>(i)];
           const double greatest = std::max(values[0], values[3]);
-          const double u = camera_.cx + camera_.fx * (greatest * roots[i]);
+          const double u = camera_.cx - u_first_ + camera_.fx * (greatest * roots[i]);
           if (footprint.of_x[i] > 0) u_first = std::max(u_first, u - 1);
           if (footprint.of_x[i] < 0) u_last = std::min(u_last, u + 1);
           if (footprint.of_x[i] == 0 && greatest < 0) u_last = u_first - 1;
@@ -293,6 +296,7 @@ class TiledPicture {
   }
 
   PinholeCamera camera_;
+  int u_first_, width_;
   std::size_t columns_, rows_;         ///< of tiles
   std::vector<double> ray_x_, ray_y_;  ///< of each column and row of pixels
   // Of each column and row of tiles: the rays through its first and last pixels.

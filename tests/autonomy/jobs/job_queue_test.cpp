@@ -6,6 +6,9 @@
 #include <chrono>
 #include <ctime>
 #include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "math/random.h"
 
@@ -179,6 +182,76 @@ TEST(JobQueue, TheCallerLeavesLongJobsToOthersWhileItWaitsForAShortOne) {
   EXPECT_TRUE(slow_waited);
   jobs.advance(3 * kMs);
   EXPECT_TRUE(slow_begun);
+}
+
+TEST(JobQueue, DoesEachPieceOfASplitJobOnce) {
+  for (const int threads : {1, 2, 5}) {
+    JobQueue jobs(threads);
+    const auto lane = jobs.add_lane("a"), other = jobs.add_lane("b");
+    std::vector<int> done(100, 0), done_of_other(7, 0);
+    bool delivered = false;
+    jobs.schedule(lane, kMs, [&]() -> JobQueue::Delivery {
+      jobs.split(done.size(), [&](std::size_t i) { ++done[i]; });
+      const bool all = done == std::vector<int>(100, 1);
+      jobs.split(0, [](std::size_t) { ADD_FAILURE(); });
+      return [&delivered, all] { delivered = all; };
+    });
+    jobs.schedule(other, kMs, [&]() -> JobQueue::Delivery {
+      jobs.split(done_of_other.size(), [&](std::size_t i) { ++done_of_other[i]; });
+      return nullptr;
+    });
+    jobs.advance(kMs);
+    EXPECT_TRUE(delivered);
+    EXPECT_EQ(done_of_other, std::vector<int>(7, 1));
+  }
+}
+
+TEST(JobQueue, ThreadsWithoutAJobHelpWithPiecesOfAnothersAndTheJobIsChargedForThem) {
+  // Each piece ends when all four have begun: one on each thread, the caller's included.
+  JobQueue jobs(4);
+  const auto lane = jobs.add_lane("a");
+  std::atomic<int> begun{0};
+  std::vector<int> together(4, 0);
+  jobs.schedule(lane, kMs, [&]() -> JobQueue::Delivery {
+    jobs.split(4, [&](std::size_t i) {
+      ++begun;
+      for (int k = 0; k < 5000 && begun < 4; ++k)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      together[i] = begun;
+      const auto thread_s = [] {
+        timespec t{};
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+        return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+      };
+      const double begin = thread_s();
+      while (thread_s() - begin < 0.01) {
+      }
+    });
+    return nullptr;
+  });
+  jobs.advance(kMs);
+  EXPECT_EQ(together, std::vector<int>(4, 4));
+  ASSERT_EQ(jobs.timings().at(lane).seconds.size(), 1u);
+  EXPECT_GE(jobs.timings().at(lane).seconds[0], 0.04F);
+}
+
+TEST(JobQueue, RethrowsWhatThePieceOfTheLeastNumberThrew) {
+  for (const int threads : {1, 3}) {
+    JobQueue jobs(threads);
+    const auto lane = jobs.add_lane("a");
+    jobs.schedule(lane, kMs, [&]() -> JobQueue::Delivery {
+      jobs.split(20, [](std::size_t i) {
+        if (i % 7 == 3) throw std::runtime_error(std::to_string(i));
+      });
+      return nullptr;
+    });
+    try {
+      jobs.advance(kMs);
+      ADD_FAILURE() << "threw nothing";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "3");
+    }
+  }
 }
 
 TEST(JobQueue, RethrowsWhatAJobThrew) {

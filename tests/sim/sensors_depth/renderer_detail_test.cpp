@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "depth_scenes.h"
 #include "sensors/d430_stereo.h"
@@ -139,6 +140,37 @@ TEST(RendererDetail, ChangesNothingThatIsLargeEnough) {
 }
 
 // As many pixels of fewer leaves, and from farther away none that was not there before.
+TEST(RendererDetail, InHowManyStripsAPictureIsDrawnChangesNoBit) {
+  const worlds::World world = small_forest(9);
+  RendererOptions options{.far_m = 60, .least_leaf_px = 8, .least_width_px = 0.7};
+  Renderer whole(world, kCamera, options);
+  EXPECT_EQ(whole.strips(), 1U);
+  for (const auto& [strips, align] : {std::pair{2, 16}, {3, 1}, {7, 16}, {4, 500}}) {
+    options.strips = strips;
+    options.strip_align_px = align;
+    Renderer cut(world, kCamera, options);
+    int column = 0;
+    for (std::size_t i = 0; i < cut.strips(); ++i) {
+      EXPECT_EQ(cut.columns(i).first, column);
+      EXPECT_EQ(column % align, 0);
+      column += cut.columns(i).count;
+    }
+    EXPECT_EQ(column, kCamera.width);
+    EXPECT_LE(cut.strips(), static_cast<std::size_t>(strips));
+    RandomStream random(9, "poses");
+    for (int i = 0; i < 4; ++i) {
+      const Pose X_WC = flying_pose(world, random) * forward_camera();
+      std::vector<float> depth, depth_cut;
+      std::vector<std::uint32_t> seen, seen_cut;
+      whole.render_triangles(X_WC, depth, seen);
+      cut.render_triangles(X_WC, depth_cut, seen_cut);
+      ASSERT_EQ(depth, depth_cut) << strips;
+      ASSERT_EQ(seen, seen_cut) << strips;
+      EXPECT_LT(cut.last_frame().triangles, cut.strips() * whole.last_frame().triangles);
+    }
+  }
+}
+
 TEST(RendererDetail, MergedLeavesCoverWhatAllOfThemDoAndAreAmongThem) {
   worlds::MeshBuilder builder;
   add_sheet_of_leaves(builder, 49, 0.15);

@@ -5,6 +5,8 @@
 #include <thread>
 
 #include "../sensors_depth/depth_scenes.h"
+#include "jobs/job_queue.h"
+#include "worlds/garage.h"
 
 namespace arex::sim {
 namespace {
@@ -49,6 +51,39 @@ TEST(InfraredPair, AFrameDependsOnNothingButItsSeedAndShot) {
     const auto alone = every.capture(shot);
     EXPECT_EQ(image->left, alone->left);
     EXPECT_TRUE(alone->right.empty());
+  }
+}
+
+TEST(InfraredPair, AFrameIsTheSameInHoweverManyStripsAndOnHoweverManyThreads) {
+  worlds::GarageRecipe garage;
+  garage.length_m = 50;
+  garage.width_m = 30;
+  for (const worlds::World& world : {small_forest(2), worlds::build(garage, 2)}) {
+    const Scene scene(world);
+    const Pose X_BC = VehicleConfig{}.X_BC();
+    const D430Config unit = D430Config{}.as_built(3);
+    InfraredPair whole({}, unit, world, scene, X_BC, 3);
+    for (const int threads : {2, 3}) {
+      JobQueue jobs(threads);
+      const auto lane = jobs.add_lane("infrared");
+      InfraredPair cut({}, unit, world, scene, X_BC, 3, 2 * threads);
+      const auto split = [&](std::size_t count, const std::function<void(std::size_t)>& piece) {
+        jobs.split(count, piece);
+      };
+      RandomStream random(2, "shots");
+      for (Stamp frame = 0; frame < 3; ++frame) {
+        const InfraredShot shot = shot_at(world, random, frame * kNanosecondsPerSecond / 10);
+        const auto image = whole.capture(shot);
+        StereoImagePtr together;
+        jobs.schedule(lane, frame, [&]() -> JobQueue::Delivery {
+          together = cut.capture(shot, split);
+          return nullptr;
+        });
+        jobs.advance(frame);
+        EXPECT_EQ(image->left, together->left);
+        EXPECT_EQ(image->right, together->right);
+      }
+    }
   }
 }
 

@@ -16,11 +16,13 @@ struct InfraredLightConfig {
   double sky_lx = 8e3;           ///< from all of the sky together, on level ground
   double sky_darkness = 0.5;     ///< the sky's near infrared over its light [E]: less is scattered
   bool lamps = true;
-  double lamp_flux_lm = 1800;    ///< of a strip of 1.5 m: 75 lx on the aisle, 15 in the bays
-  double draw_range_m = 45;      ///< further things are the backdrop's
-  double least_leaf_px = 4;      ///< [E] far leaves are merged to this, the side of a square
-  double least_width_px = 0.35;  ///< [E] solids thinner than this are not drawn: far twigs
-  double grid_m = 0.8;           ///< least spacing of the nodes that hold the indirect light
+  double lamp_flux_lm = 1800;        ///< of a strip of 1.5 m: 75 lx on the aisle, 15 in the bays
+  bool projector = false;            ///< the device's own; odometry wants it off
+  double projector_power_w = 0.360;  ///< datasheet
+  double draw_range_m = 45;          ///< further things are the backdrop's
+  double least_leaf_px = 4;          ///< [E] far leaves are merged to this, the side of a square
+  double least_width_px = 0.35;      ///< [E] solids thinner than this are not drawn: far twigs
+  double grid_m = 0.8;               ///< least spacing of the nodes that hold the indirect light
 
   void fields(auto& f) {
     f("sun", sun, "it shines; off, an overcast sky is left");
@@ -32,6 +34,8 @@ struct InfraredLightConfig {
       "how much of the sky's light an infrared camera sees of it [E]");
     f("lamps", lamps, "lamps under ceilings are lit");
     f("lamp_flux_lm", lamp_flux_lm, "luminous flux of each");
+    f("projector", projector, "the depth camera's dots are projected");
+    f("projector_power_w", projector_power_w, "optical power of the projector, on average");
     f("draw_range_m", draw_range_m, "what lies further is not drawn");
     f("least_leaf_px", least_leaf_px, "smaller leaves are merged into larger ones; 0: never");
     f("least_width_px", least_width_px, "thinner solids are not drawn; 0: all are");
@@ -43,6 +47,7 @@ struct InfraredLightConfig {
     f.check(sky_lx >= 0 && sky_lx <= 1e5, "0 <= sky_lx <= 1e5");
     f.check(sky_darkness >= 0 && sky_darkness <= 1, "0 <= sky_darkness <= 1");
     f.check(lamp_flux_lm >= 0 && lamp_flux_lm <= 1e5, "0 <= lamp_flux_lm <= 1e5");
+    f.check(projector_power_w > 0 && projector_power_w <= 10, "0 < projector_power_w <= 10");
     f.check(draw_range_m >= 1 && draw_range_m <= 2000, "1 <= draw_range_m <= 2000");
     f.check(least_leaf_px >= 0 && least_leaf_px <= 20, "0 <= least_leaf_px <= 20");
     f.check(least_width_px >= 0 && least_width_px <= 5, "0 <= least_width_px <= 5");
@@ -102,7 +107,7 @@ struct InfraredSensorConfig {
 };
 
 /// The D430's infrared pair. Its geometry, resolution and focal length are the depth camera's,
-/// whose left imager it shares; the projector is off.
+/// whose left imager it shares; the projector is off unless `light.projector` says otherwise.
 struct InfraredConfig {
   bool enabled = false;
   int rate_hz = 10;
@@ -120,7 +125,7 @@ struct InfraredConfig {
     f("latency_s", latency_s, "end of the exposure to the image's delivery");
     f("clock_offset_s", clock_offset_s, "stamps are later than the truth by this");
     f("mount_error_rad", mount_error_rad, "rotation of the true camera in the one of the drawings");
-    f("light", light, "sun, sky and lamps");
+    f("light", light, "sun, sky, lamps and projector");
     sensor.fields(f);
     f.check(rate_hz > 0 && rate_hz <= 300, "0 < rate_hz <= 300");
     f.check(right_every >= 1, "right_every >= 1");

@@ -74,8 +74,8 @@ void InfraredImager::expose(const InfraredScene& scene, const InfraredExposure& 
   grey.resize(scene.light_lx.size());
   split(kPieces, [&](std::size_t piece) {
     const Rows rows = rows_of(piece);
-    if (config_.motion_blur) smear(scene, exposure.exposure_s, twist, rows);
-    spread_along_rows(config_.motion_blur ? smeared_ : scene.light_lx, rows);
+    smear(scene, exposure.exposure_s, twist, rows);
+    spread_along_rows(rows);
   });
   split(kPieces, [&](std::size_t piece) {
     const Rows rows = rows_of(piece);
@@ -165,45 +165,56 @@ Float8 InfraredImager::mean_along_eight(const std::vector<float>& in, int u, int
   return sum * step;
 }
 
-/// Each pixel takes the mean of the light along the way that its own surface's image goes.
+/// Each pixel takes the mean of the light along the way that its own surface's image goes, and the
+/// light that stays where it is.
 void InfraredImager::smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist,
                            const Rows& rows) {
   const int w = camera_.width;
   Ways ways{std::vector<float>(column_x_.size()), std::vector<float>(column_x_.size())};
   for (int v = rows.first; v < rows.end; ++v) {
-    find_ways(scene, v, exposure_s, twist, ways);
     const float* in = &scene.light_lx[size(v) * size(w)];
     float* out = &smeared_[size(v) * size(w)];
     std::copy(in, in + w, out);
-    const auto moves = [&](int u) {
-      return !(std::max(std::abs(ways.u[size(u)]), std::abs(ways.v[size(u)])) < kLeastSmear);
-    };
-    for (int u = 0; u < w;) {
-      if (u + 8 <= w) {
-        std::array<bool, 8> moved{};
-        for (int i = 0; i < 8; ++i) moved[size(i)] = moves(u + i);
-        if (std::find(moved.begin(), moved.end(), true) != moved.end()) {
-          const Float8 mean = mean_along_eight(scene.light_lx, u, v, ways);
-          for (int i = 0; i < 8; ++i) out[u + i] = moved[size(i)] ? mean[i] : out[u + i];
-        }
-        u += 8;
-        continue;
+    if (config_.motion_blur) smear_row(scene, exposure_s, twist, v, ways);
+    if (scene.steady_lx.empty()) continue;
+    const float* steady = &scene.steady_lx[size(v) * size(w)];
+    for (int u = 0; u < w; ++u) out[u] += steady[u];
+  }
+}
+
+void InfraredImager::smear_row(const InfraredScene& scene, double exposure_s,
+                               const CameraTwist& twist, int v, Ways& ways) {
+  const int w = camera_.width;
+  find_ways(scene, v, exposure_s, twist, ways);
+  float* out = &smeared_[size(v) * size(w)];
+  const auto moves = [&](int u) {
+    return !(std::max(std::abs(ways.u[size(u)]), std::abs(ways.v[size(u)])) < kLeastSmear);
+  };
+  for (int u = 0; u < w;) {
+    if (u + 8 <= w) {
+      std::array<bool, 8> moved{};
+      for (int i = 0; i < 8; ++i) moved[size(i)] = moves(u + i);
+      if (std::find(moved.begin(), moved.end(), true) != moved.end()) {
+        const Float8 mean = mean_along_eight(scene.light_lx, u, v, ways);
+        for (int i = 0; i < 8; ++i) out[u + i] = moved[size(i)] ? mean[i] : out[u + i];
       }
-      if (moves(u)) {
-        out[u] = mean_along(scene.light_lx, u, v, ways.u[size(u)], ways.v[size(u)]);
-      }
-      ++u;
+      u += 8;
+      continue;
     }
+    if (moves(u)) {
+      out[u] = mean_along(scene.light_lx, u, v, ways.u[size(u)], ways.v[size(u)]);
+    }
+    ++u;
   }
 }
 
 /// The optics' kernel: a, 1 - 2a, a along rows, then along columns.
-void InfraredImager::spread_along_rows(const std::vector<float>& in_all, const Rows& rows) {
+void InfraredImager::spread_along_rows(const Rows& rows) {
   const int w = camera_.width;
   const auto a = static_cast<float>(config_.blur_kernel);
   const float centre = 1 - 2 * a;
   for (int v = rows.first; v < rows.end; ++v) {
-    const float* in = &in_all[size(v) * size(w)];
+    const float* in = &smeared_[size(v) * size(w)];
     float* out = &rows_[size(v) * size(w)];
     out[0] = (centre + a) * in[0] + a * in[1];
     for (int u = 1; u < w - 1; ++u) out[u] = centre * in[u] + a * (in[u - 1] + in[u + 1]);

@@ -46,13 +46,15 @@ class InfraredImager {
   [[nodiscard]] Rows rows_of(std::size_t piece) const;
   void smear(const InfraredScene& scene, double exposure_s, const CameraTwist& twist,
              const Rows& rows);
+  void smear_row(const InfraredScene& scene, double exposure_s, const CameraTwist& twist, int v,
+                 Ways& ways);
   void find_ways(const InfraredScene& scene, int v, double exposure_s, const CameraTwist& twist,
                  Ways& ways) const;
   [[nodiscard]] float mean_along(const std::vector<float>& in, int u, int v, float du,
                                  float dv) const;
   [[nodiscard]] Float8 mean_along_eight(const std::vector<float>& in, int u, int v,
                                         const Ways& ways) const;
-  void spread_along_rows(const std::vector<float>& in, const Rows& rows);
+  void spread_along_rows(const Rows& rows);
   void spread_along_columns(const Rows& rows);
   void read(const InfraredExposure& exposure, std::uint64_t seed, const Rows& rows,
             std::vector<std::uint8_t>& grey) const;

@@ -26,7 +26,8 @@ CameraTwist InfraredPair::twist(const InfraredShot& shot, const Pose& X_BE) cons
 
 void InfraredPair::take(const InfraredShot& shot, const Pose& X_BE, std::uint64_t eye,
                         const Split& split, InfraredScene& scene, std::vector<std::uint8_t>& grey) {
-  shader_.draw(shot.X_WB * X_BE, scene, split);
+  const double projector_x_m = DotProjector::kBesideLeftEye_m - (eye == 0 ? 0 : baseline_m_);
+  shader_.draw(shot.X_WB * X_BE, scene, split, projector_x_m);
   RandomStream frame = RandomStream(seed_, "infrared").fork(static_cast<std::uint64_t>(shot.stamp));
   imager_.expose(scene, shot.exposure, twist(shot, X_BE), frame.fork(eye).bits(), grey, split);
 }

@@ -38,6 +38,7 @@ InfraredShader::InfraredShader(const InfraredLightConfig& light, const worlds::W
       lamp_lx_(static_cast<float>(light.lamp_flux_lm / kStripArea)),
       pixel_rad_(static_cast<float>(1 / camera.fx)),
       off_surface_m_(static_cast<float>(0.6 * grid_.spacing_m())) {
+  if (light.projector) projector_.emplace(light);
   for (std::size_t i = 0; i < renderer_.strips(); ++i) strips_.push_back(make_strip(i));
 }
 
@@ -220,6 +221,33 @@ void InfraredShader::draw_band(const View& view, Strip& strip, int v_first,
     }
     *mixture.pixel = 0.25F * total;
   }
+  for (int i = 0; projector_ && i < rows; ++i) {
+    const std::size_t first =
+        static_cast<std::size_t>(kSamples * i) * strip.column_x.size() * kSamples;
+    add_dots(view, strip, v_first + i, depths + first, triangles + first, out);
+  }
+}
+
+/// The projector's light on a row's samples. @param depths, triangles as draw_row()'s
+void InfraredShader::add_dots(const View& view, const Strip& strip, int v, const float* depths,
+                              const std::uint32_t* triangles, InfraredScene& out) const {
+  const std::size_t width = strip.column_x.size();
+  float* light =
+      &out.steady_lx[static_cast<std::size_t>(v) * static_cast<std::size_t>(camera_.width) +
+                     strip.first];
+  for (std::size_t i = 0; i < kSamples * kSamples * width; ++i) {
+    if (triangles[i] == Renderer::kNoTriangle) continue;
+    const std::size_t row = i / (kSamples * width), column = i % (kSamples * width);
+    const auto u_fine = static_cast<double>(kSamples * strip.first + column);
+    const auto v_fine = static_cast<double>(kSamples * static_cast<std::size_t>(v) + row);
+    const auto x = static_cast<float>((u_fine - fine_.cx) / fine_.fx);
+    const auto y = static_cast<float>((v_fine - fine_.cy) / fine_.fy);
+    const float q = depths[i], a = x - view.projector_x_m * q;
+    const SurfaceFacet& facet = surfaces_.facet(triangles[i]);
+    const Vec3f ray_W = a * view.right_W + y * view.down_W + view.ahead_W;
+    const float lx = projector_->at(a, y) * q * q * std::abs(facet.normal_W.dot(ray_W));
+    light[column / kSamples] += lx * facet.albedo / (kSamples * kSamples);
+  }
 }
 
 void InfraredShader::draw_strip(const View& view, Strip& strip, InfraredScene& out) {
@@ -227,14 +255,17 @@ void InfraredShader::draw_strip(const View& view, Strip& strip, InfraredScene& o
   for (int v = 0; v < camera_.height; v += kBand) draw_band(view, strip, v, out);
 }
 
-void InfraredShader::draw(const Pose& X_WC, InfraredScene& out, const Split& split) {
+void InfraredShader::draw(const Pose& X_WC, InfraredScene& out, const Split& split,
+                          double projector_x_m) {
   renderer_.find_visible(X_WC);
   const Eigen::Matrix3f R = X_WC.R.cast<float>();
-  const View view{X_WC.p.cast<float>(), R.col(0), R.col(1), R.col(2)};
+  const View view{X_WC.p.cast<float>(), R.col(0), R.col(1), R.col(2),
+                  static_cast<float>(projector_x_m)};
   const std::size_t pixels =
       static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height);
   out.light_lx.resize(pixels);
   out.inverse_depth.resize(pixels);
+  out.steady_lx.assign(projector_ ? pixels : 0, 0);
   split(strips_.size(), [&](std::size_t i) { draw_strip(view, strips_[i], out); });
 }
 

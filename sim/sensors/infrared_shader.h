@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "jobs/split.h"
@@ -13,6 +14,7 @@
 #include "sensors/infrared_lamps.h"
 #include "sensors/infrared_light.h"
 #include "sensors/infrared_materials.h"
+#include "sensors/infrared_projector.h"
 #include "sensors/infrared_shot.h"
 #include "sensors/infrared_sun.h"
 #include "sensors/renderer.h"
@@ -37,7 +39,9 @@ class InfraredShader {
                  const PinholeCamera& camera, int strips = 1);
 
   /// What is seen from X_WC, drawn in strips side by side. Callable from any thread, one at a time.
-  void draw(const Pose& X_WC, InfraredScene& out, const Split& split = in_turn);
+  /// @param projector_x_m where the projector stands along this eye's x axis
+  void draw(const Pose& X_WC, InfraredScene& out, const Split& split = in_turn,
+            double projector_x_m = DotProjector::kBesideLeftEye_m);
 
   static constexpr int kSamples = 2;  ///< along each axis of a pixel
 
@@ -60,6 +64,7 @@ class InfraredShader {
   struct View {
     Vec3f eye_W;
     Vec3f right_W, down_W, ahead_W;  ///< the camera's axes
+    float projector_x_m = 0;
   };
   /// Rows of pixels that are shaded together: the rows of samples lie in the cache meanwhile.
   static constexpr int kBand = 2;
@@ -110,6 +115,8 @@ class InfraredShader {
 
   void draw_strip(const View& view, Strip& strip, InfraredScene& out);
   void draw_band(const View& view, Strip& strip, int v_first, InfraredScene& out) const;
+  void add_dots(const View& view, const Strip& strip, int v, const float* depths,
+                const std::uint32_t* triangles, InfraredScene& out) const;
   void draw_row(const View& view, Strip& strip, int v, const float* depths,
                 const std::uint32_t* triangles, InfraredScene& out) const;
   void eight_pixels(const View& view, const Strip& strip, std::size_t u, std::uint32_t triangle,
@@ -152,6 +159,7 @@ class InfraredShader {
   float sun_lx_ = 0;
   InfraredSurfaces surfaces_;
   Backdrop backdrop_;
+  std::optional<DotProjector> projector_;
   Renderer renderer_;
   float lamp_lx_ = 0, pixel_rad_ = 0, off_surface_m_ = 0;
   std::vector<Strip> strips_;

@@ -34,6 +34,7 @@ struct InfraredShot {
 struct InfraredScene {
   std::vector<float> light_lx;       ///< of each pixel, rows from the top: as a white surface's
   std::vector<float> inverse_depth;  ///< 1/z, 1/m: mean over the pixel; 0 where all is backdrop
+  std::vector<float> steady_lx{};    ///< light as light_lx that moves with the camera; empty: none
 };
 
 }  // namespace arex::sim

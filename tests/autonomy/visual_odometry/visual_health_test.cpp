@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
 
 #include "math/random.h"
 #include "synthetic_flight.h"
@@ -108,6 +111,35 @@ TEST(VisualHealth, DriftsMoreAmongWhatMovesButIsNotLost) {
   EXPECT_GT(dropped, 100U);
   EXPECT_EQ(count(swaying, OdometryStatus::kLost), 0);
   EXPECT_LT(100 * swaying.ate_m / flight().path_m, 1.5);
+}
+
+/// The projector's dots: features `stuck` says of stay where they were in the image when they were
+/// first seen after from_s.
+TamperFrame dots(double from_s, double to_s, const std::function<bool(std::int64_t)>& stuck) {
+  auto first = std::make_shared<std::map<std::int64_t, Vec2>>();
+  return [=](FeatureFrame& frame) {
+    if (frame.stamp < from_seconds(from_s) || frame.stamp >= from_seconds(to_s)) return;
+    for (TrackedFeature& feature : frame.features) {
+      if (!stuck(feature.id)) continue;
+      const Vec2 at = first->emplace(feature.id, feature.left).first->second;
+      if (feature.right) *feature.right += at - feature.left;
+      feature.left = at;
+    }
+  };
+}
+
+TEST(VisualHealth, DropsSomeDotsThatFlyAlongAndNoticesThatAllDo) {
+  const SyntheticRun some =
+      fly(flight(), config(), dots(5, 1000, [](std::int64_t id) { return id % 4 == 0; }));
+  std::size_t dropped = 0;
+  for (const VisualUpdate& update : some.updates) dropped += update.window.outliers.size();
+  EXPECT_GT(dropped, 100U);
+  EXPECT_EQ(count(some, OdometryStatus::kLost), 0);
+  EXPECT_LT(100 * some.ate_m / flight().path_m, 1.5);
+
+  const SyntheticRun all = fly(flight(), config(), dots(15, 18, [](std::int64_t) { return true; }));
+  EXPECT_TRUE(told(all, "large innovation"));
+  EXPECT_EQ(all.fast.back().status, OdometryStatus::kOk);
 }
 
 TEST(VisualHealth, TellsABiasThatIsNone) {

@@ -177,6 +177,12 @@ Pose Flight::X_WB(Stamp stamp) const {
   return simulation_->X_WO * simulation_->motion.at(to_seconds(stamp)).X_OB;
 }
 
+sim::Truth Flight::truth(Stamp stamp) const { return simulation_->truth(stamp); }
+
+const worlds::World& Flight::world() const { return simulation_->world; }
+
+const sim::Scene& Flight::scene() const { return simulation_->scene; }
+
 double Flight::distance_m() const {
   double distance = 0;
   const test::AnalyticMotion& motion = simulation_->motion;

@@ -9,6 +9,7 @@
 
 #include "math/pose.h"
 #include "messages/sensors.h"
+#include "physics/truth.h"
 #include "sensors/scene.h"
 #include "support/analytic_motion.h"
 #include "worlds/world.h"
@@ -41,6 +42,9 @@ class Flight {
   /// The scan over [i, i + 1) * 0.1 s.
   [[nodiscard]] LidarScanPtr scan(int i);
   [[nodiscard]] Pose X_WB(Stamp stamp) const;
+  [[nodiscard]] sim::Truth truth(Stamp stamp) const;
+  [[nodiscard]] const worlds::World& world() const;
+  [[nodiscard]] const sim::Scene& scene() const;
   [[nodiscard]] double distance_m() const;  ///< flown
   /// From a point in W to the nearest surface, leaves included.
   [[nodiscard]] double surface_distance(const Vec3& p_W) const;

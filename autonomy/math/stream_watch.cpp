@@ -39,7 +39,9 @@ void StreamWatch::learn(double delay_s, double period_s) {
 }
 
 StreamWatch::State StreamWatch::newest(Stamp now, bool lively) const {
-  if (now - arrived_ > from_seconds(config_.silent_s)) return State::kSilent;
+  const double silent_s = std::max(config_.silent_s, config_.silent_periods * usual_period_s_);
+  const bool knows_period = config_.silent_periods == 0 || readings_ > 0;
+  if (knows_period && now - arrived_ > from_seconds(silent_s)) return State::kSilent;
   const bool counts = lively || state_ == State::kStuck;  // at rest it is not sound again
   if (counts && same_ >= config_.stuck_readings) return State::kStuck;
   if (delay_s_ > usual_delay_s_ + config_.late_s) return State::kLate;

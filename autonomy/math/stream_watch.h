@@ -13,9 +13,10 @@ namespace arex {
 
 /// When a stream of readings is called faulty.
 struct StreamWatchConfig {
-  double silent_s = 0.5;     ///< without a reading: silent
-  int stuck_readings = 100;  ///< in a row without a changed bit: stuck; no real sensor is so still
-  double late_s = 0.03;      ///< readings come this much later than at first: late
+  double silent_s = 0.5;      ///< without a reading: silent
+  double silent_periods = 0;  ///< and so many of its usual periods: of what comes at any rate
+  int stuck_readings = 100;   ///< in a row without a changed bit: stuck; no real sensor is so still
+  double late_s = 0.03;       ///< readings come this much later than at first: late
   double missing_share = 0.05;  ///< of the readings: they are missing
   int learnt_readings = 200;    ///< over which the usual delay and period are learnt
 };

@@ -22,12 +22,16 @@ constexpr StreamWatchConfig kImuStream{
 // What is silent of a LiDAR is LidarWatch's to say.
 constexpr StreamWatchConfig kLidarStream{
     .silent_s = 1e6, .stuck_readings = 2, .late_s = 0.08, .learnt_readings = 10};
-constexpr StreamWatchConfig kDepthStream{
-    .silent_s = 0.5, .stuck_readings = 2, .late_s = 0.08, .learnt_readings = 10};
+constexpr StreamWatchConfig kImageStream{.silent_s = 0.5,
+                                         .silent_periods = 3,
+                                         .stuck_readings = 2,
+                                         .late_s = 0.08,
+                                         .learnt_readings = 10};
 constexpr StreamWatchConfig kMocapStream{.silent_s = 0.1, .stuck_readings = 40};
 
 struct Survey {
   double valid = 0;  ///< share of the pixels looked at
+  double sum_m = 0;  ///< of their depths
   double rough = 0;  ///< mean deviation from the neighbours' mean, of the depth
   double holes = 0;  ///< of the pixels with one surface on both sides, the share without a depth
   bool surfaces = false;  ///< there are enough of those to tell
@@ -54,6 +58,7 @@ void survey_holes(const DepthImage& image, Survey& survey) {
 Survey survey(const DepthImage& image) {
   constexpr float kSameSurface = 0.1F;  // of the depth
   constexpr float kNear_m = 3;          // beyond, a stereo camera's own noise is as large
+  Survey seen;
   int looked = 0, valid = 0, smooth = 0;
   double deviation = 0;
   for (int v = 0; v < image.camera.height; v += kPixelStep) {
@@ -62,6 +67,7 @@ Survey survey(const DepthImage& image) {
       const float here = image.at(u, v);
       if (here == 0) continue;
       ++valid;
+      seen.sum_m += static_cast<double>(here);
       const float left = image.at(u - 4, v), right = image.at(u + 4, v);
       const float mean = 0.5F * (left + right);
       if (left == 0 || right == 0 || mean > kNear_m) continue;
@@ -73,7 +79,6 @@ Survey survey(const DepthImage& image) {
   }
   if (looked == 0) return {};
   constexpr int kFew = 100;  // say nothing
-  Survey seen;
   seen.valid = static_cast<double>(valid) / looked;
   if (smooth >= kFew) seen.rough = deviation / smooth;
   survey_holes(image, seen);
@@ -111,7 +116,7 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   const Survey seen = survey(image);
   // Dark images are alike, and nothing stuck.
   const double tells_apart = seen.valid > 0 ? 0 : to_seconds(image.stamp);
-  stream(name, kDepthStream).add(now, image.stamp, std::array{seen.valid, seen.rough, tells_apart});
+  stream(name, kImageStream).add(now, image.stamp, std::array{seen.sum_m, seen.rough, tells_apart});
   Images& images = images_[name];
   if (images.usual_valid < 0) images.usual_valid = seen.valid;
   if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;
@@ -135,6 +140,22 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
     images.usual_holes += (seen.holes - images.usual_holes) / kImageMemory;
   }
   tell_images(now, name, images);
+}
+
+void HealthWatch::add_images(Stamp now, const StereoImage& images) {
+  constexpr std::size_t kEach = 61;  // pixels: of every row some, of no column all
+  double sum = 0, moment = 0;
+  std::uint8_t least = 255, most = 0;
+  for (std::size_t i = 0; i < images.left.size(); i += kEach) {
+    const std::uint8_t grey = images.left[i];
+    sum += grey;
+    moment += static_cast<double>(i) * grey;
+    least = std::min(least, grey);
+    most = std::max(most, grey);
+  }
+  // Black images are alike, and white ones, and nothing stuck.
+  const double tells_apart = least < most ? 0 : to_seconds(images.time_ns);
+  stream("infrared", kImageStream).add(now, images.time_ns, std::array{sum, moment, tells_apart});
 }
 
 void HealthWatch::tell_images(Stamp now, const std::string& name, Images& images) {

@@ -8,6 +8,7 @@
 #include "math/vibration_watch.h"
 #include "messages/events.h"
 #include "messages/sensors.h"
+#include "messages/stereo_image.h"
 #include "stack/field_watch.h"
 #include "stack/health_watch_config.h"
 
@@ -24,6 +25,7 @@ class HealthWatch {
   void add_imu(Stamp now, const ImuSample& imu);
   void add_scan(Stamp now, const LidarScan& scan);
   void add_depth(Stamp now, const DepthImage& image);
+  void add_images(Stamp now, const StereoImage& images);
   void add_mocap(Stamp now, const MocapSample& mocap);
 
   /// How it flies, as the stack knows it.

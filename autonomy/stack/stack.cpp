@@ -161,6 +161,7 @@ void Stack::add_scan(const LidarScanPtr& scan) {
 }
 
 void Stack::add_images(const StereoImagePtr& images) {
+  health_watch_.add_images(now_, *images);
   for (Source& source : sources_) start(source, source.odometry->add_images(images));
 }
 

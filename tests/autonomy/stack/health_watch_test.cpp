@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "math/random.h"
 
@@ -74,6 +75,109 @@ TEST(HealthWatch, TellsABlindedCameraAndANoisyOne) {
   camera.told.clear();
   camera.run(20, 0.05, 0.9);
   EXPECT_EQ(camera.told, "depth noisy;");
+}
+
+/// Images of an infrared pair, and what the watch tells of them in flight.
+class Pair {
+ public:
+  Pair(std::uint64_t seed, double rate_hz)
+      : noise_(seed, "pixels"), period_(from_seconds(1 / rate_hz)) {}
+
+  enum class Doing { kSound, kSilent, kStuck, kBlack, kWhite };
+  /// @param late_s beyond the usual delay
+  void run(double seconds, Doing doing, double late_s = 0) {
+    const Stamp end = now_ + from_seconds(seconds);
+    for (; now_ < end; now_ += kNanosecondsPerTick * 5) {
+      if (now_ >= next_) {
+        if (doing != Doing::kSilent) watch_.add_images(now_, image(doing, from_seconds(late_s)));
+        next_ += period_;
+      }
+      for (const Event& event : watch_.update(now_, {.in_air = true})) told += event.detail + ";";
+    }
+  }
+  std::string told;
+
+ private:
+  StereoImage image(Doing doing, Stamp late) {
+    StereoImage image;
+    image.time_ns = next_ - from_seconds(0.04) - late;
+    image.width = 848;
+    image.height = 480;
+    if (doing != Doing::kStuck) {
+      pixels_.assign(std::size_t{848} * 480, doing == Doing::kWhite ? 255 : 0);
+      if (doing == Doing::kSound) {
+        for (std::uint8_t& grey : pixels_)
+          grey = static_cast<std::uint8_t>(90 + noise_.uniform_int(0, 3));
+      }
+    }
+    image.left = pixels_;
+    return image;
+  }
+
+  HealthWatch watch_{HealthWatchConfig{}};
+  RandomStream noise_;
+  Stamp period_, now_ = 0, next_ = 0;
+  std::vector<std::uint8_t> pixels_;
+};
+
+TEST(HealthWatch, TellsAnInfraredPairThatIsSilentStuckOrLate) {
+  using Doing = Pair::Doing;
+  for (const double rate_hz : {10.0, 5.0, 2.0}) {
+    Pair pair(1, rate_hz);
+    pair.run(12, Doing::kSound);
+    EXPECT_EQ(pair.told, "") << rate_hz;
+    pair.run(3, Doing::kSilent);
+    EXPECT_EQ(pair.told, "infrared silent;") << rate_hz;
+    pair.run(4, Doing::kSound);
+    EXPECT_EQ(pair.told, "infrared silent;infrared sound again;") << rate_hz;
+    pair.told.clear();
+    pair.run(4, Doing::kStuck);
+    EXPECT_EQ(pair.told, "infrared stuck;") << rate_hz;
+    pair.run(4, Doing::kSound);
+    EXPECT_EQ(pair.told, "infrared stuck;infrared sound again;") << rate_hz;
+    pair.told.clear();
+    pair.run(8, Doing::kSound, 0.2);
+    EXPECT_EQ(pair.told, "infrared late;") << rate_hz;
+  }
+}
+
+TEST(HealthWatch, TakesNeitherASlowPairNorTheDarkForAFault) {
+  using Doing = Pair::Doing;
+  Pair slow(2, 1);
+  slow.run(30, Doing::kSound);
+  EXPECT_EQ(slow.told, "");
+  Pair pair(3, 10);
+  pair.run(3, Doing::kSound);
+  pair.run(3, Doing::kBlack);
+  pair.run(3, Doing::kWhite);
+  EXPECT_EQ(pair.told, "");
+}
+
+// A few pixels in range, as many in each image, are no image that hangs.
+TEST(HealthWatch, TakesAViewOfLittleForNoStuckCamera) {
+  HealthWatch watch{HealthWatchConfig{}};
+  RandomStream random(4, "depth");
+  DepthImage image;
+  image.camera = {320, 240, 160, 160, 160, 120};
+  std::string told;
+  const auto run = [&](int frames, bool hangs) {
+    for (int i = 0; i < frames; ++i, image.stamp += kNanosecondsPerSecond / 10) {
+      if (!hangs) {
+        image.depth_m.assign(std::size_t{320} * 240, 0);
+        for (std::size_t k = 0; k < 320 * 8; ++k) {
+          image.depth_m[k] = static_cast<float>(8 + 0.1 * random.normal());
+        }
+      }
+      watch.add_depth(image.stamp, image);
+      for (const Event& event : watch.update(image.stamp, {.in_air = true})) {
+        told += event.detail + ";";
+      }
+    }
+  };
+  run(30, false);
+  EXPECT_EQ(told, "");
+  run(10, true);
+  EXPECT_EQ(told, "depth stuck;");
 }
 
 /// Nine axes at 200 Hz, of which the field is what a magnetometer of `rate_hz` gave last.

@@ -55,6 +55,24 @@ sim::InfraredShot shot_at(const std::vector<sim::TimedPose>& truth, const Pose& 
   return shot;
 }
 
+/// A row of infrared.csv; nothing: an older run's, which says how but not from where.
+std::optional<sim::InfraredShot> shot_of(const sim::Table& frames, std::size_t row) {
+  const auto at = [&](const char* name) {
+    const std::vector<double> values = frames.numbers(name);
+    return values.empty() ? std::nan("") : values[row];
+  };
+  sim::InfraredShot shot;
+  shot.stamp = from_seconds(at("time_s"));
+  shot.X_WB.p = Vec3(at("x_m"), at("y_m"), at("z_m"));
+  shot.X_WB.R = Quat(at("qw"), at("qx"), at("qy"), at("qz")).toRotationMatrix();
+  shot.v_WB = Vec3(at("vx_mps"), at("vy_mps"), at("vz_mps"));
+  shot.w_WB_B = Vec3(at("wx_radps"), at("wy_radps"), at("wz_radps"));
+  shot.right = false;
+  const bool whole = shot.X_WB.p.allFinite() && shot.X_WB.R.allFinite() && shot.v_WB.allFinite() &&
+                     shot.w_WB_B.allFinite();
+  return whole ? std::optional(shot) : std::nullopt;
+}
+
 /// Of a scene that nobody looked at before: as auto exposure settles in front of it.
 sim::InfraredExposure settled(const sim::InfraredSensorConfig& config, sim::InfraredPair& pair,
                               sim::InfraredShot shot) {
@@ -140,7 +158,8 @@ void draw_infrared(const RenderArguments& arguments, const sim::Scenario& scenar
   std::optional<std::size_t> row;
   if (!times.empty()) row = nearest_row(times, time);
   if (row) time = times[*row];
-  sim::InfraredShot shot = shot_at(truth, sim::start_pose(world), time);
+  const std::optional<sim::InfraredShot> taken = row ? shot_of(frames, *row) : std::nullopt;
+  sim::InfraredShot shot = taken ? *taken : shot_at(truth, sim::start_pose(world), time);
   if (row) {
     shot.exposure = {frames.numbers("exposure_s")[*row], frames.numbers("gain")[*row]};
   } else {

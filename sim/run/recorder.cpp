@@ -153,14 +153,22 @@ void Recorder::sample(Stamp stamp, const FlightSample& sample) {
                      csv_number(row.battery_fraction, 5)));
 }
 
-void Recorder::images(Stamp stamp, const StereoImage& images, double mean_grey) {
+void Recorder::images(const InfraredShot& shot, const StereoImage& images, double mean_grey) {
   if (!infrared_) {
     attempt([&] { infrared_.emplace(open("infrared.csv", csv_header("infrared.csv"))); });
   }
   if (!infrared_) return;
   append(*infrared_,
-         fmt::format("{:.9f},{:.6f},{:.4f},{:.2f},{:d}\n", to_seconds(stamp), images.exposure_s,
+         fmt::format("{:.9f},{},{},{:.2f},{:d}", to_seconds(shot.stamp), images.exposure_s,
                      images.gain, mean_grey, images.right.empty() ? 0 : 1));
+  // Digits enough to take the same picture again.
+  const Quat q = shot.X_WB.quaternion();
+  for (const double value : {shot.X_WB.p.x(), shot.X_WB.p.y(), shot.X_WB.p.z(), q.x(), q.y(), q.z(),
+                             q.w(), shot.v_WB.x(), shot.v_WB.y(), shot.v_WB.z(), shot.w_WB_B.x(),
+                             shot.w_WB_B.y(), shot.w_WB_B.z()}) {
+    append(*infrared_, fmt::format(",{}", value));
+  }
+  append(*infrared_, "\n");
 }
 
 void Recorder::features(const std::vector<FeatureSight>& features) {

@@ -21,6 +21,7 @@
 #include "messages/visual_tracks.h"
 #include "scoring/flight_scorer.h"
 #include "semantics/semantic_map.h"
+#include "sensors/infrared_shot.h"
 
 namespace arex::sim {
 
@@ -60,7 +61,7 @@ class Recorder {
   /// To truth.tum, estimate.tum and flight.csv; what further sources say to NAME.tum.
   void sample(Stamp stamp, const FlightSample& sample);
   /// How an infrared frame was taken, to infrared.csv.
-  void images(Stamp stamp, const StereoImage& images, double mean_grey);
+  void images(const InfraredShot& shot, const StereoImage& images, double mean_grey);
   /// What a visual odometry followed in an exposure, to vio_features.csv.
   void features(const std::vector<FeatureSight>& features);
   /// Every candidate of a decision with its terms, to decisions.csv.

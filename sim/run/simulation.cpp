@@ -139,9 +139,8 @@ Simulation::~Simulation() { jobs_.stop(); }
 
 void Simulation::record_to(Recorder& recorder) {
   recorder_ = &recorder;
-  outlets_.on_images = [&recorder](Stamp stamp, const StereoImage& images, double mean_grey) {
-    recorder.images(stamp, images, mean_grey);
-  };
+  outlets_.on_images = [&recorder](const InfraredShot& shot, const StereoImage& images,
+                                   double mean_grey) { recorder.images(shot, images, mean_grey); };
 }
 
 void Simulation::record_to(BagWriter& bag) {

@@ -398,6 +398,19 @@ std::vector<ColumnInfo> map_and_decision_columns() {
       {"infrared.csv", "gain", "", "of the amplifier"},
       {"infrared.csv", "mean_grey", "", "of the left image's middle, 0 to 255"},
       {"infrared.csv", "right", "", "1: the right eye was read, too"},
+      {"infrared.csv", "x_m", "m", "where the vehicle truly was then, B in the world W"},
+      {"infrared.csv", "y_m", "m", "the same along y"},
+      {"infrared.csv", "z_m", "m", "the same along z"},
+      {"infrared.csv", "qx", "", "its attitude, a quaternion: of B in W"},
+      {"infrared.csv", "qy", "", "the same"},
+      {"infrared.csv", "qz", "", "the same"},
+      {"infrared.csv", "qw", "", "the same, its scalar part"},
+      {"infrared.csv", "vx_mps", "m/s", "its velocity in W"},
+      {"infrared.csv", "vy_mps", "m/s", "the same along y"},
+      {"infrared.csv", "vz_mps", "m/s", "the same along z"},
+      {"infrared.csv", "wx_radps", "rad/s", "its rate in B"},
+      {"infrared.csv", "wy_radps", "rad/s", "the same about y"},
+      {"infrared.csv", "wz_radps", "rad/s", "the same about z"},
   };
 }
 

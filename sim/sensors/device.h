@@ -12,6 +12,7 @@
 #include "physics/powertrain.h"
 #include "physics/truth.h"
 #include "sensors/fault.h"
+#include "sensors/infrared_shot.h"
 #include "sensors/scene.h"
 #include "stack/flight_software.h"
 #include "worlds/world.h"
@@ -31,8 +32,10 @@ struct Outlets {
   FlightSoftware* software = nullptr;
   std::vector<BagWriter*> bags;  ///< where they are recorded
   Fingerprint frames;            ///< of every scan and image, in order of delivery
-  /// Told of every infrared frame delivered, its true stamp and mean grey value; may be empty.
-  std::function<void(Stamp stamp, const StereoImage& images, double mean_grey)> on_images;
+  /// Told of every infrared frame delivered, how it was taken and its mean grey value; may be
+  /// empty.
+  std::function<void(const InfraredShot& shot, const StereoImage& images, double mean_grey)>
+      on_images;
 };
 
 /// What a device is made from, beside its own parameters.

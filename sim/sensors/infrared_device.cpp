@@ -79,7 +79,7 @@ void InfraredDevice::expose(const Moment& moment) {
       } else {
         pass(image);
       }
-      if (outlets_.on_images) outlets_.on_images(shot.stamp, *image, mean);
+      if (outlets_.on_images) outlets_.on_images(shot, *image, mean);
     };
   });
 }

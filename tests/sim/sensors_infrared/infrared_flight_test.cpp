@@ -5,6 +5,7 @@
 #include "report/table.h"
 #include "run/simulation.h"
 #include "sensors/infrared_exposure.h"
+#include "sensors/infrared_pair.h"
 #include "support/temporary_folder.h"
 
 namespace arex::sim {
@@ -70,6 +71,49 @@ TEST(InfraredFlight, ExposureFollowsTheImagesDeliveredBefore) {
   }
   EXPECT_GE(changes, 3);  // daylight is not what it began with
   EXPECT_NEAR(mean.back(), config.sensor.mean_target, 0.1 * config.sensor.mean_target);
+}
+
+// The file says enough to take each picture again.
+TEST(InfraredFlight, RecordsFromWhereEachFrameWasTaken) {
+  const TemporaryFolder folder;
+  const Scenario scenario =
+      load_scenario(AREX_SOURCE_DIR "/scenarios/forest_small.yaml",
+                    std::vector<std::string>{"infrared.enabled=true", "mission.max_time_s=8"}, 1);
+  {
+    Recorder recorder(folder.path(), scenario.resolved_yaml());
+    static_cast<void>(fly(scenario, 1, &recorder));
+  }
+  const ScenarioConfig& config = scenario.config;
+  const worlds::World world =
+      worlds::build_world(config.world, config.seed, load_airframe().radius_m);
+  const Scene scene(world);
+  InfraredPair pair(config.infrared, config.depth.model.as_built(config.seed), world, scene,
+                    load_airframe().X_BC, config.seed);
+  const Table table = read_table(folder / "infrared.csv");
+  const auto column = [&](const char* name) { return table.numbers(name); };
+  const auto times = column("time_s"), exposure = column("exposure_s"), gain = column("gain");
+  const auto mean = column("mean_grey");
+  ASSERT_GT(times.size(), 60U);
+  int moving = 0;
+  for (std::size_t i = 30; i < times.size(); i += 5) {
+    InfraredShot shot;
+    shot.stamp = from_seconds(times[i]);
+    shot.X_WB.p = Vec3(column("x_m")[i], column("y_m")[i], column("z_m")[i]);
+    shot.X_WB.R =
+        Quat(column("qw")[i], column("qx")[i], column("qy")[i], column("qz")[i]).toRotationMatrix();
+    shot.v_WB = Vec3(column("vx_mps")[i], column("vy_mps")[i], column("vz_mps")[i]);
+    shot.w_WB_B = Vec3(column("wx_radps")[i], column("wy_radps")[i], column("wz_radps")[i]);
+    shot.exposure = {exposure[i], gain[i]};
+    shot.right = false;
+    const auto again = pair.capture(shot);
+    EXPECT_NEAR(central_mean(again->left, again->width, again->height), mean[i], 0.006) << i;
+    moving += shot.v_WB.norm() > 0.5;
+    shot.X_WB.p.z() += 0.02;  // two centimetres and a wrong moment are seen
+    const auto beside = pair.capture(shot);
+    EXPECT_GT(std::abs(central_mean(beside->left, beside->width, beside->height) - mean[i]), 0.006)
+        << i;
+  }
+  EXPECT_GT(moving, 2);
 }
 
 TEST(InfraredFlight, RefusesWhatNoImagerCanDo) {

@@ -116,7 +116,7 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   const Survey seen = survey(image);
   // Dark images are alike, and nothing stuck.
   const double tells_apart = seen.valid > 0 ? 0 : to_seconds(image.stamp);
-  stream(name, kImageStream).add(now, image.stamp, std::array{seen.sum_m, seen.rough, tells_apart});
+  stream(name, kImageStream).add(now, image.stamp, std::array{seen.sum_m, tells_apart});
   Images& images = images_[name];
   if (images.usual_valid < 0) images.usual_valid = seen.valid;
   if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;

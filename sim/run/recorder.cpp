@@ -158,17 +158,17 @@ void Recorder::images(const InfraredShot& shot, const StereoImage& images, doubl
     attempt([&] { infrared_.emplace(open("infrared.csv", csv_header("infrared.csv"))); });
   }
   if (!infrared_) return;
-  append(*infrared_,
-         fmt::format("{:.9f},{},{},{:.2f},{:d}", to_seconds(shot.stamp), images.exposure_s,
-                     images.gain, mean_grey, images.right.empty() ? 0 : 1));
+  std::string row =
+      fmt::format("{:.9f},{},{},{:.2f},{:d}", to_seconds(shot.stamp), images.exposure_s,
+                  images.gain, mean_grey, images.right.empty() ? 0 : 1);
   // Digits enough to take the same picture again.
   const Quat q = shot.X_WB.quaternion();
   for (const double value : {shot.X_WB.p.x(), shot.X_WB.p.y(), shot.X_WB.p.z(), q.x(), q.y(), q.z(),
                              q.w(), shot.v_WB.x(), shot.v_WB.y(), shot.v_WB.z(), shot.w_WB_B.x(),
                              shot.w_WB_B.y(), shot.w_WB_B.z()}) {
-    append(*infrared_, fmt::format(",{}", value));
+    row += fmt::format(",{}", value);
   }
-  append(*infrared_, "\n");
+  append(*infrared_, row + "\n");
 }
 
 void Recorder::features(const std::vector<FeatureSight>& features) {

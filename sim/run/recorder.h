@@ -60,7 +60,7 @@ class Recorder {
   void event(const Event& event);
   /// To truth.tum, estimate.tum and flight.csv; what further sources say to NAME.tum.
   void sample(Stamp stamp, const FlightSample& sample);
-  /// How an infrared frame was taken, to infrared.csv.
+  /// From where and how an infrared frame was taken, to infrared.csv.
   void images(const InfraredShot& shot, const StereoImage& images, double mean_grey);
   /// What a visual odometry followed in an exposure, to vio_features.csv.
   void features(const std::vector<FeatureSight>& features);

@@ -22,8 +22,7 @@ constexpr float kPeak = 3 / (3.14159265F * kRadius * kRadius);
 }  // namespace
 
 DotProjector::DotProjector(const InfraredLightConfig& light)
-    : cell_(std::sqrt(kArea / kDots)),
-      cells_per_unit_(1 / cell_),
+    : cells_per_unit_(1 / std::sqrt(kArea / kDots)),
       mean_lx_(kLxPerWattPerM2 * static_cast<float>(light.projector_power_w) / kArea) {}
 
 float DotProjector::at(float a, float b) const {

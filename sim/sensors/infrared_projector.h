@@ -24,7 +24,7 @@ class DotProjector {
   [[nodiscard]] float mean_lx() const { return mean_lx_; }
 
  private:
-  float cell_, cells_per_unit_;  ///< of the lattice that holds a dot in each cell, in a and b
+  float cells_per_unit_;  ///< of the lattice that holds a dot in each cell, in a and b
   float mean_lx_;
 };
 

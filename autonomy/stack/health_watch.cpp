@@ -87,8 +87,11 @@ Survey survey(const DepthImage& image) {
 
 }  // namespace
 
-HealthWatch::HealthWatch(const HealthWatchConfig& config)
-    : config_(config), vibration_(config.vibration, kImuHz), field_(config.field_step_gauss) {}
+HealthWatch::HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle)
+    : config_(config),
+      vehicle_(std::move(vehicle)),
+      vibration_(config.vibration, kImuHz),
+      field_(config.field_step_gauss) {}
 
 StreamWatch& HealthWatch::stream(const std::string& name, const StreamWatchConfig& config) {
   return streams_.try_emplace(name, name, config).first->second;
@@ -102,13 +105,36 @@ void HealthWatch::add_imu(Stamp now, const ImuSample& imu) {
   field_.add(imu.field_gauss);
 }
 
-void HealthWatch::add_scan(Stamp now, const LidarScan& scan) {
+void HealthWatch::add_scan(Stamp now, const LidarScanPtr& scan) {
   std::array<double, StreamWatch::kValues> ends{};
-  if (!scan.points.empty()) {
-    const Vec3f &first = scan.points.front().p_L, &last = scan.points.back().p_L;
+  if (!scan->points.empty()) {
+    const Vec3f &first = scan->points.front().p_L, &last = scan->points.back().p_L;
     ends = {first.x(), first.y(), first.z(), last.x(), last.y(), last.z()};
   }
-  stream(scan.device.empty() ? "lidar" : scan.device, kLidarStream).add(now, scan.end, ends);
+  stream(scan->device.empty() ? "lidar" : scan->device, kLidarStream).add(now, scan->end, ends);
+  if (scan->device.empty()) scan_ = scan;
+}
+
+// Into the sky and close before the ground there is nothing to measure, and no fault in it. What
+// the LiDAR has met within the camera's reach and view, a sound camera measures.
+bool HealthWatch::sees_nothing_either(const DepthImage& image) const {
+  constexpr Stamp kFresh = kNanosecondsPerSecond / 2;
+  constexpr double kNearest_m = 0.5, kReach_m = 5;  // what any stereo depth camera measures
+  constexpr int kFew = 50;                          // points
+  if (!scan_ || image.stamp - scan_->end > kFresh) return false;
+  const Pose X_CL = vehicle_.X_BC(image.device).inverse() * vehicle_.X_BL();
+  const PinholeCamera& camera = image.camera;
+  int there = 0, unseen = 0;
+  for (const LidarPoint& point : scan_->points) {
+    const Vec3 p_C = X_CL * Vec3(point.p_L.cast<double>());
+    if (p_C.z() < kNearest_m || p_C.z() > kReach_m) continue;
+    const double u = camera.cx + camera.fx * p_C.x() / p_C.z();
+    const double v = camera.cy + camera.fy * p_C.y() / p_C.z();
+    if (!(u > -0.5 && v > -0.5 && u < camera.width - 0.5 && v < camera.height - 0.5)) continue;
+    ++there;
+    unseen += image.at(static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v))) == 0;
+  }
+  return there < kFew || unseen < (1 - config_.blind_share) * there;
 }
 
 void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
@@ -121,6 +147,7 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   if (images.usual_valid < 0) images.usual_valid = seen.valid;
   if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;
   const bool blind = seen.valid < config_.blind_share * images.usual_valid;
+  const bool nothing_there = blind && sees_nothing_either(image);
   const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_fraction &&
                      seen.rough > config_.rough_factor * images.usual_rough;
   if (images.usual_holes < 0 && seen.surfaces) images.usual_holes = seen.holes;
@@ -129,7 +156,7 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   const double limit = (images.told_holes ? kOver : 1) * config_.holes_share;
   const bool holes = tells && seen.holes > images.usual_holes + limit;
   if (tells) images.holes = holes ? images.holes + 1 : 0;
-  images.blind = blind ? images.blind + 1 : 0;
+  if (!nothing_there) images.blind = blind ? images.blind + 1 : 0;
   images.rough = rough ? images.rough + 1 : 0;
   // What is wrong does not become usual.
   if (!blind) images.usual_valid += (seen.valid - images.usual_valid) / kImageMemory;

@@ -9,6 +9,7 @@
 #include "messages/events.h"
 #include "messages/sensors.h"
 #include "messages/stereo_image.h"
+#include "messages/vehicle.h"
 #include "stack/field_watch.h"
 #include "stack/health_watch_config.h"
 
@@ -19,11 +20,11 @@ namespace arex {
 /// whether the vehicle does as it is told. What the LiDAR's points say is LidarWatch's.
 class HealthWatch {
  public:
-  explicit HealthWatch(const HealthWatchConfig& config);
+  explicit HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle = {});
 
   // What arrives, between two calls of update.
   void add_imu(Stamp now, const ImuSample& imu);
-  void add_scan(Stamp now, const LidarScan& scan);
+  void add_scan(Stamp now, const LidarScanPtr& scan);
   void add_depth(Stamp now, const DepthImage& image);
   void add_images(Stamp now, const StereoImage& images);
   void add_mocap(Stamp now, const MocapSample& mocap);
@@ -58,8 +59,12 @@ class HealthWatch {
   StreamWatch& stream(const std::string& name, const StreamWatchConfig& config);
   void report(Stamp now, EventKind kind, std::string detail);
   void tell_images(Stamp now, const std::string& name, Images& images);
+  /// Whether a camera that measures little has little before it, as the LiDAR sees it.
+  [[nodiscard]] bool sees_nothing_either(const DepthImage& image) const;
 
   HealthWatchConfig config_;
+  VehicleConfig vehicle_;
+  LidarScanPtr scan_;  ///< the newest of the first LiDAR; null before
   VibrationWatch vibration_;
   std::map<std::string, StreamWatch> streams_;
   std::map<std::string, Images> images_;

@@ -20,7 +20,8 @@ struct HealthWatchConfig {
   void fields(auto& f) {
     f("vibration", vibration, "when the airframe is called shaking, by the IMU's output");
     f("blind_share", blind_share,
-      "a depth image with less than this part of the usual pixels is blinded");
+      "a depth image with less than this part of the usual pixels, and of what the LiDAR meets in "
+      "its view, is blinded");
     f("holes_share", holes_share,
       "one in which this part more of the surfaces than usual has no depth is blinded in part");
     f("field_step_gauss", field_step_gauss,

@@ -70,7 +70,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       may_fly_(std::max<std::size_t>(1, config_.odometry.failover.size())),
       switch_(config_.odometry.handover, may_fly_),
       lidar_watch_(config_.odometry.watch),
-      health_watch_(config_.health),
+      health_watch_(config_.health, config_.vehicle),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
       explorer_(make(modules().explorers, config_.exploration.strategy, config_, seed)),
@@ -141,7 +141,7 @@ void Stack::add_mocap(const MocapSample& mocap) {
 }
 
 void Stack::add_scan(const LidarScanPtr& scan) {
-  health_watch_.add_scan(now_, *scan);
+  health_watch_.add_scan(now_, scan);
   if (!scan->device.empty()) {  // for the maps only
     if (config_.mapping.takes(scan->device)) perception_.add_scan(now_, *scan);
     return;

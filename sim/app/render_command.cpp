@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -111,6 +112,16 @@ void draw_film(const RenderArguments& arguments, const worlds::World& world, con
   }
 }
 
+// Of a recording nobody knows the world unless the configuration said it.
+void check_world_known(const std::filesystem::path& folder) {
+  const auto summary = sim::read_summary(folder);
+  if (!summary || !summary->contains("replay")) return;
+  if ((*summary)["replay"].value("world_known", false)) return;
+  throw ConfigError(folder.string() +
+                    ": is a replay that knows no world, expected a run, or a replay with --config "
+                    "of the flight's resolved.yaml");
+}
+
 // A part of a snapshot: no world is needed.
 int draw_part(const RenderArguments& arguments) {
   const auto named =
@@ -140,6 +151,7 @@ int render(const RenderArguments& arguments) {
                       ", expected a run folder");
   }
   if (!arguments.what.empty() && arguments.what != "infrared") return draw_part(arguments);
+  check_world_known(folder);
   const std::vector<sim::TimedPose> truth = sim::read_tum(folder / "truth.tum");
   if (truth.size() < 2) {
     throw ConfigError((folder / "truth.tum").string() +

@@ -139,6 +139,17 @@ int draw_features(const std::filesystem::path& folder, double time_s, double per
   return drawn;
 }
 
+/// Of what the pair suffered then: the picture is what it took, not what the vehicle got.
+std::string faults_at(const std::vector<sim::FaultConfig>& faults, double time_s) {
+  std::string told;
+  for (const sim::FaultConfig& fault : faults) {
+    if (fault.device != "infrared" || !fault.holds(from_seconds(time_s))) continue;
+    told += fmt::format("; fault then: infrared {}, so the vehicle did not get this image as it is",
+                        sim::kFaultKindNames[static_cast<std::size_t>(fault.kind)]);
+  }
+  return told;
+}
+
 }  // namespace
 
 void draw_infrared(const RenderArguments& arguments, const sim::Scenario& scenario,
@@ -169,9 +180,9 @@ void draw_infrared(const RenderArguments& arguments, const sim::Scenario& scenar
   const int features =
       draw_features(arguments.folder, time, 1.0 / config.infrared.rate_hz, picture);
   sim::save_png(picture, arguments.out);
-  std::printf("%s: left infrared image of %.3f s, exposed %.3f ms, gain %.2f, %d features\n",
+  std::printf("%s: left infrared image of %.3f s, exposed %.3f ms, gain %.2f, %d features%s\n",
               arguments.out.c_str(), time, 1e3 * shot.exposure.exposure_s, shot.exposure.gain,
-              features);
+              features, faults_at(config.faults, time).c_str());
 }
 
 }  // namespace arex::app

@@ -171,6 +171,8 @@ void Replay::record() {
     if (recorder_ && concerns_replay(event)) recorder_->event(event);
   }
   static_cast<void>(stack_->take_decisions());
+  const std::vector<FeatureSight> features = stack_->take_features();
+  if (recorder_) recorder_->features(features);
   if (now_ % kSamplePeriod == 0) {
     // The estimate that is held when a sample has come is the one of its stamp.
     const FlightView view = stack_->view();
@@ -244,7 +246,9 @@ ReplayResult Replay::finish(const std::vector<StampedPose>& truth) {
   result.interrupted = interrupted_;
   result.began = !flown_.estimates.empty();
   result.lost = flown_.status == OdometryStatus::kLost;
-  result.missing = kOdometryNeedNames[static_cast<std::size_t>(stack_->view().need)];
+  const FlightView view = stack_->view();
+  result.missing = kOdometryNeedNames[static_cast<std::size_t>(view.need)];
+  result.tally = view.tally;
   Beside flown = flown_.beside(truth);
   result.odometry = flown.score();
   result.poses = std::move(flown.pairs);
@@ -252,6 +256,10 @@ ReplayResult Replay::finish(const std::vector<StampedPose>& truth) {
   for (const auto& [name, track] : others_) {
     if (track.estimates.empty()) continue;
     result.others[name] = {track.beside(truth).score(), track.lost_s};
+  }
+  for (const NamedOdometry& other : view.others) {
+    const auto found = result.others.find(std::string(other.name));
+    if (found != result.others.end()) found->second.tally = other.tally;
   }
   if (!result.poses.empty()) result.distance_m = length_of(result.poses);
   if (recorder_) {
@@ -284,9 +292,11 @@ nlohmann::ordered_json summarise_replay(const Scenario& scenario, const ReplayRe
   figures.set("odometry.source", scenario.config.stack.odometry.source);
   add_figures(result.odometry, "odometry", figures);
   if (result.began) figures.set("odometry.lost_s", result.lost_s);
+  add_figures(result.tally, "odometry", figures);
   for (const auto& [name, source] : result.others) {
     add_figures(source.score, "odometries." + name, figures);
     figures.set("odometries." + name + ".lost_s", source.lost_s);
+    add_figures(source.tally, "odometries." + name, figures);
   }
   figures.set("build.version", build_version());
   figures.set("build.compiler", build_compiler());
@@ -298,7 +308,8 @@ nlohmann::ordered_json summarise_replay(const Scenario& scenario, const ReplayRe
                     {"lidar_misses", input.lidar_misses()},
                     {"truth_topic", input.truth_topic()},
                     {"damaged_places", input.damage().places},
-                    {"notes", input.notes()}};
+                    {"notes", input.notes()},
+                    {"world_known", scenario.source.find("world") != nullptr}};
   if (!input.depth_topic().empty()) {
     json["replay"]["depth"] = json_of(input.depth_counts(), input.depth_topic());
   }

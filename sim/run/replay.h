@@ -30,6 +30,7 @@ struct ReplayResult {
   std::vector<PosePair> poses;  ///< truth and estimate at the truth's stamps; empty without truth
   OdometryScore odometry;
   double lost_s = 0;
+  std::optional<VisualTally> tally;  ///< of a visual odometry in the place of the flying one
   std::map<std::string, SourceScore> others;
   std::optional<double> distance_m;  ///< along the truth
   std::vector<TimingRow> timing;

@@ -4,6 +4,16 @@
 #include <utility>
 
 namespace arex {
+namespace {
+
+/// Pictures of nothing, black or white all over, are alike and repeat nothing.
+bool repeats(const StereoImage& image, const StereoImage& before) {
+  if (image.left != before.left || image.left.empty()) return false;
+  const auto [least, most] = std::minmax_element(image.left.begin(), image.left.end());
+  return *least < *most;
+}
+
+}  // namespace
 
 VisualInertialOdometry::VisualInertialOdometry(const VisualInertialConfig& config, const Pose& X_BC,
                                                std::uint64_t seed)
@@ -22,8 +32,10 @@ const Odometry& VisualInertialOdometry::add_imu(const ImuSample& imu) {
   return odometry_;
 }
 
-ImageJob VisualInertialOdometry::prepare(const StereoImagePtr& images) {
-  return {images, std::exchange(unhanded_, {})};
+std::optional<ImageJob> VisualInertialOdometry::prepare(const StereoImagePtr& images) {
+  if (handed_ && repeats(*images, *handed_)) return std::nullopt;
+  handed_ = images;
+  return ImageJob{images, std::exchange(unhanded_, {})};
 }
 
 VisualUpdate VisualInertialOdometry::correct(const ImageJob& job) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,9 @@ class VisualInertialOdometry {
   /// @pre imu.stamp is later than every stamp seen so far.
   const Odometry& add_imu(const ImuSample& imu);
 
-  /// Hands the exposure and the IMU samples since the last call to a job.
-  [[nodiscard]] ImageJob prepare(const StereoImagePtr& images);
+  /// Hands the exposure and the IMU samples since the last call to a job. @return nothing for the
+  /// same picture once more: a camera that hangs exposes nothing, and no scene stands as still.
+  [[nodiscard]] std::optional<ImageJob> prepare(const StereoImagePtr& images);
   /// Front and back end; heavy, any thread, beside add_imu().
   [[nodiscard]] VisualUpdate correct(const ImageJob& job);
   /// The back end alone, on features followed elsewhere. @param imu samples since the last call
@@ -71,6 +73,7 @@ class VisualInertialOdometry {
 
   ImuPredictor predictor_;
   std::vector<ImuSample> unhanded_;  ///< samples that no job has got yet
+  StereoImagePtr handed_;            ///< the newest exposure that a job has got
   ImuSample newest_;
   VisualUpdate update_;  ///< the newest applied
   Odometry odometry_;

@@ -5,7 +5,9 @@
 namespace arex {
 
 std::optional<OdometrySource::Job> VisualInertialSource::add_images(const StereoImagePtr& images) {
-  return [this, job = odometry_.prepare(images)]() -> Delivery {
+  std::optional<ImageJob> prepared = odometry_.prepare(images);
+  if (!prepared) return std::nullopt;
+  return [this, job = *std::move(prepared)]() -> Delivery {
     VisualUpdate update = odometry_.correct(job);
     std::vector<FeatureSight> features;
     if (report_features_) {

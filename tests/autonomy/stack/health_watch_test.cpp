@@ -38,16 +38,33 @@ class Camera {
           image.depth_m[static_cast<std::size_t>(320 * v + u)] = 0;
         }
       }
+      if (lidar_m_ > 0) watch_.add_scan(now_, scan());
       watch_.add_depth(now_, image);
       for (const Event& event : watch_.update(now_, {})) told += event.detail + ";";
     }
   }
+  /// From now on a LiDAR beside it meets what stands so far away; 0: there is none.
+  void set_lidar(double distance_m) { lidar_m_ = distance_m; }
   std::string told;
 
  private:
+  /// In the middle of the image, at one depth.
+  LidarScanPtr scan() {
+    const VehicleConfig vehicle;
+    const Pose X_LC = vehicle.X_BL().inverse() * vehicle.X_BC();
+    auto scan = std::make_shared<LidarScan>();
+    scan->end = now_;
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 p_C = lidar_m_ * Vec3(noise_.uniform() - 0.5, noise_.uniform() - 0.5, 1);
+      scan->points.push_back({.p_L = (X_LC * p_C).cast<float>()});
+    }
+    return scan;
+  }
+
   HealthWatch watch_{HealthWatchConfig{}};
   RandomStream noise_;
   Stamp now_ = 0;
+  double lidar_m_ = 0;
 };
 
 TEST(HealthWatch, TellsACameraThatIsBlindedInPartFromOneThatSeesLess) {
@@ -75,6 +92,38 @@ TEST(HealthWatch, TellsABlindedCameraAndANoisyOne) {
   camera.told.clear();
   camera.run(20, 0.05, 0.9);
   EXPECT_EQ(camera.told, "depth noisy;");
+}
+
+// Above the edge of a roof there is nothing to measure; the LiDAR says so.
+TEST(HealthWatch, TakesAViewOfNothingForNoBlindness) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Camera camera(seed);
+    camera.set_lidar(2);
+    camera.run(40, 0, 0.9);
+    camera.set_lidar(20);
+    camera.run(20, 0, 0.97, 0, 0.95);  // the wall ends, but for a strip
+    camera.set_lidar(2);
+    camera.run(20, 0, 0.9);
+    EXPECT_EQ(camera.told, "") << seed;
+    camera.run(20, 0, 0.1);  // it stands there, and is not measured
+    EXPECT_EQ(camera.told, "depth blinded;") << seed;
+    camera.set_lidar(20);
+    camera.run(20, 0, 0.1);  // whether it would be, nobody knows
+    EXPECT_EQ(camera.told, "depth blinded;") << seed;
+    camera.set_lidar(2);
+    camera.run(20, 0, 0.9);
+    EXPECT_EQ(camera.told, "depth blinded;depth not blinded any more;") << seed;
+  }
+}
+
+// Its last scan lies too long ago to say anything.
+TEST(HealthWatch, TellsABlindedCameraOfAVehicleWhoseLidarIsSilent) {
+  Camera camera;
+  camera.set_lidar(20);
+  camera.run(40, 0, 0.9);
+  camera.set_lidar(0);
+  camera.run(20, 0, 0.1);
+  EXPECT_EQ(camera.told, "depth blinded;");
 }
 
 /// Images of an infrared pair, and what the watch tells of them in flight.

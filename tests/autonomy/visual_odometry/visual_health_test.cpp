@@ -142,6 +142,38 @@ TEST(VisualHealth, DropsSomeDotsThatFlyAlongAndNoticesThatAllDo) {
   EXPECT_EQ(all.fast.back().status, OdometryStatus::kOk);
 }
 
+// A camera that hangs says again what it said last, with new stamps.
+TEST(VisualHealth, TakesAPictureOnceMoreForNoExposure) {
+  StereoImage image;
+  image.width = 4;
+  image.height = 1;
+  image.left = image.right = {10, 20, 30, 40};
+  const auto taken = [&](Stamp stamp, std::vector<std::uint8_t> left) {
+    image.time_ns = stamp;
+    image.left = std::move(left);
+    return std::make_shared<const StereoImage>(image);
+  };
+  VisualInertialOdometry odometry(config(), Pose(), 1);
+  ImuSample imu;
+  imu.stamp = 1;
+  odometry.add_imu(imu);
+  const auto first = odometry.prepare(taken(1, {10, 20, 30, 40}));
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->imu.size(), 1U);
+  imu.stamp = 2;
+  odometry.add_imu(imu);
+  EXPECT_FALSE(odometry.prepare(taken(2, {10, 20, 30, 40})));
+  imu.stamp = 3;
+  odometry.add_imu(imu);
+  const auto other = odometry.prepare(taken(3, {10, 20, 30, 41}));  // the noise of one pixel
+  ASSERT_TRUE(other);
+  EXPECT_EQ(other->imu.size(), 2U);  // the repeated one has taken none
+  for (const std::uint8_t grey : {std::uint8_t{0}, std::uint8_t{255}}) {
+    EXPECT_TRUE(odometry.prepare(taken(4, std::vector<std::uint8_t>(4, grey)))) << int{grey};
+    EXPECT_TRUE(odometry.prepare(taken(5, std::vector<std::uint8_t>(4, grey)))) << int{grey};
+  }
+}
+
 TEST(VisualHealth, TellsABiasThatIsNone) {
   SyntheticFlight spoilt = flight();
   for (ImuSample& sample : spoilt.imu) {

@@ -137,13 +137,14 @@ TEST(RecordedFlight, GivesItsEstimatesAndItsMapWhenReplayed) {
 TEST(RecordedFlight, GivesWhatItsCamerasSawWhenReplayed) {
   const TemporaryFolder folder;
   const std::vector<std::string> cameras{"mapping.use_depth=true",
-                                         "odometries.vio.type=visual_inertial"};
+                                         "odometries.vio.type=visual_inertial",
+                                         "odometries.vio.report_features=true"};
   const std::vector<Stamp> times{8 * kNanosecondsPerSecond};
   const Scenario flown = hop(folder.path(), cameras);
   BagOptions options;
   options.infrared = true;
   options.infrared_baseline_m = flown.config.depth.model.baseline_m;
-  fly(flown, folder.path(), {{"flight.mcap", options}}, times);
+  const FlightResult flight = fly(flown, folder.path(), {{"flight.mcap", options}}, times);
   ASSERT_FALSE(testing::Test::HasFailure());
   const auto snapshot_of = [&](const char* run, const char* file) {
     return read_text(folder / run / "snapshots/8" / file);
@@ -161,6 +162,15 @@ TEST(RecordedFlight, GivesWhatItsCamerasSawWhenReplayed) {
     EXPECT_EQ(counts.damaged + counts.unordered + counts.doubled, 0U);
   }
   for (const char* name : {"estimate.tum", "vio.tum"}) expect_same_trajectory(folder.path(), name);
+  EXPECT_GT(read_text(folder / "flown/vio_features.csv").size(), 10'000U);
+  EXPECT_TRUE(read_text(folder / "flown/vio_features.csv") ==
+              read_text(folder / "replayed/vio_features.csv"));
+  const auto& tally = flight.flight.others.at("vio").tally;
+  const auto& again = result.others.at("vio").tally;
+  ASSERT_TRUE(tally && again);
+  EXPECT_GT(again->keyframes, 5);
+  EXPECT_EQ(again->keyframes, tally->keyframes);
+  EXPECT_EQ(again->tracked, tally->tracked);
   EXPECT_TRUE(snapshot_of("flown", "cloud.pcd") == snapshot_of("replayed", "cloud.pcd"));
   EXPECT_TRUE(snapshot_of("flown", "grid.bt") == snapshot_of("replayed", "grid.bt"));
 
@@ -187,12 +197,19 @@ TEST(ReplayCommand, WritesAScoredRunFolderAndRefusesWithOneLine) {
   EXPECT_TRUE(std::filesystem::exists(folder / "out/report.html"));
   EXPECT_TRUE(std::filesystem::exists(folder / "out/map.bt"));
 
-  const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
-    arguments.insert(arguments.begin(), "replay");
+  const auto line = [](const std::vector<std::string>& arguments, const std::string& why) {
     const ProcessResult result = run_process(AREX_BINARY, arguments);
     EXPECT_EQ(result.exit_code, 2) << result.err;
     EXPECT_NE(result.err.find(why), std::string::npos) << result.err;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  };
+  // Nobody said in which world it was recorded.
+  const std::string picture = (folder / "picture.png").string();
+  line({"render", out, "--out", picture}, "knows no world");
+  line({"render", out, "--what", "infrared", "--out", picture}, "knows no world");
+  const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
+    arguments.insert(arguments.begin(), "replay");
+    line(arguments, why);
   };
   const std::string other = (folder / "other").string();
   refused({(folder / "none.bag").string(), "--out", other}, "No such file");

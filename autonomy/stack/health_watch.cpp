@@ -55,6 +55,31 @@ void survey_holes(const DepthImage& image, Survey& survey) {
   if (survey.surfaces) survey.holes = static_cast<double>(holes) / between;
 }
 
+/// Returns between two of their laser line at the same range: leaves and twigs, of which a depth
+/// camera makes little, have none.
+std::vector<Vec3f> points_on_surfaces(const LidarScan& scan) {
+  constexpr float kSameSurface = 0.03F;  // of the range
+  struct Line {
+    const LidarPoint* before = nullptr;
+    const LidarPoint* middle = nullptr;
+  };
+  std::array<Line, 256> lines;
+  std::vector<Vec3f> points;
+  for (const LidarPoint& point : scan.points) {
+    Line& line = lines[point.line];
+    if (line.before != nullptr) {
+      const float range = line.middle->p_L.norm();
+      const float least = std::min(line.before->p_L.norm(), point.p_L.norm());
+      const float most = std::max(line.before->p_L.norm(), point.p_L.norm());
+      const bool one_surface =
+          std::max(most, range) - std::min(least, range) < kSameSurface * range;
+      if (one_surface) points.push_back(line.middle->p_L);
+    }
+    line = {line.middle, &point};
+  }
+  return points;
+}
+
 Survey survey(const DepthImage& image) {
   constexpr float kSameSurface = 0.1F;  // of the depth
   constexpr float kNear_m = 3;          // beyond, a stereo camera's own noise is as large
@@ -115,8 +140,8 @@ void HealthWatch::add_scan(Stamp now, const LidarScanPtr& scan) {
   if (scan->device.empty()) scan_ = scan;
 }
 
-// Into the sky and close before the ground there is nothing to measure, and no fault in it. What
-// the LiDAR has met within the camera's reach and view, a sound camera measures.
+// Into the sky and close before the ground there is nothing to measure, and no fault in it. The
+// surfaces that the LiDAR has met within the camera's reach and view, a sound camera measures.
 bool HealthWatch::sees_nothing_either(const DepthImage& image) const {
   constexpr Stamp kFresh = kNanosecondsPerSecond / 2;
   constexpr double kNearest_m = 0.5, kReach_m = 5;  // what any stereo depth camera measures
@@ -125,8 +150,8 @@ bool HealthWatch::sees_nothing_either(const DepthImage& image) const {
   const Pose X_CL = vehicle_.X_BC(image.device).inverse() * vehicle_.X_BL();
   const PinholeCamera& camera = image.camera;
   int there = 0, unseen = 0;
-  for (const LidarPoint& point : scan_->points) {
-    const Vec3 p_C = X_CL * Vec3(point.p_L.cast<double>());
+  for (const Vec3f& p_L : points_on_surfaces(*scan_)) {
+    const Vec3 p_C = X_CL * Vec3(p_L.cast<double>());
     if (p_C.z() < kNearest_m || p_C.z() > kReach_m) continue;
     const double u = camera.cx + camera.fx * p_C.x() / p_C.z();
     const double v = camera.cy + camera.fy * p_C.y() / p_C.z();

@@ -48,7 +48,7 @@ class Camera {
   std::string told;
 
  private:
-  /// In the middle of the image, at one depth.
+  /// In the middle of the image, on a sphere about the LiDAR.
   LidarScanPtr scan() {
     const VehicleConfig vehicle;
     const Pose X_LC = vehicle.X_BL().inverse() * vehicle.X_BC();
@@ -56,7 +56,8 @@ class Camera {
     scan->end = now_;
     for (int i = 0; i < 200; ++i) {
       const Vec3 p_C = lidar_m_ * Vec3(noise_.uniform() - 0.5, noise_.uniform() - 0.5, 1);
-      scan->points.push_back({.p_L = (X_LC * p_C).cast<float>()});
+      const Vec3 p_L = X_LC * p_C;
+      scan->points.push_back({.p_L = (lidar_m_ * p_L.normalized()).cast<float>()});
     }
     return scan;
   }

@@ -145,7 +145,7 @@ void HealthWatch::add_scan(Stamp now, const LidarScanPtr& scan) {
 bool HealthWatch::sees_nothing_either(const DepthImage& image) const {
   constexpr Stamp kFresh = kNanosecondsPerSecond / 2;
   constexpr double kNearest_m = 0.5, kReach_m = 5;  // what any stereo depth camera measures
-  constexpr int kFew = 50;                          // points
+  constexpr int kFew = 100;                         // points
   if (!scan_ || image.stamp - scan_->end > kFresh) return false;
   const Pose X_CL = vehicle_.X_BC(image.device).inverse() * vehicle_.X_BL();
   const PinholeCamera& camera = image.camera;

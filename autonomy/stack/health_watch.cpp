@@ -178,11 +178,11 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   if (images.usual_holes < 0 && seen.surfaces) images.usual_holes = seen.holes;
   const bool tells = !blind && seen.surfaces;
   constexpr double kOver = 0.5;  // of the limit: it has ended
-  const double limit = (images.told_holes ? kOver : 1) * config_.holes_share;
+  const double limit = (images.holes.told ? kOver : 1) * config_.holes_share;
   const bool holes = tells && seen.holes > images.usual_holes + limit;
-  if (tells) images.holes = holes ? images.holes + 1 : 0;
-  if (!nothing_there) images.blind = blind ? images.blind + 1 : 0;
-  images.rough = rough ? images.rough + 1 : 0;
+  if (tells) images.holes.add(now, holes);
+  if (!nothing_there) images.blind.add(now, blind);
+  images.rough.add(now, rough);
   // What is wrong does not become usual.
   if (!blind) images.usual_valid += (seen.valid - images.usual_valid) / kImageMemory;
   if (!rough && seen.rough > 0) {
@@ -211,18 +211,19 @@ void HealthWatch::add_images(Stamp now, const StereoImage& images) {
 }
 
 void HealthWatch::tell_images(Stamp now, const std::string& name, Images& images) {
-  const auto tell = [&](int in_a_row, bool& told, const char* what) {
-    if (!told && in_a_row >= config_.frames) {
-      told = true;
+  const auto tell = [&](Finding& finding, const char* what) {
+    if (!finding.told && finding.frames >= config_.frames) {
+      finding.told = true;
       report(now, EventKind::kSensorFault, name + " " + what);
-    } else if (told && in_a_row == 0) {
-      told = false;
+    } else if (finding.told && finding.frames == 0 &&
+               now - finding.newest >= from_seconds(config_.sound_s)) {
+      finding.told = false;
       report(now, EventKind::kSensorFault, name + " not " + what + " any more");
     }
   };
-  tell(images.blind, images.told_blind, "blinded");
-  tell(images.holes, images.told_holes, "blinded in part");
-  tell(images.rough, images.told_rough, "noisy");
+  tell(images.blind, "blinded");
+  tell(images.holes, "blinded in part");
+  tell(images.rough, "noisy");
 }
 
 void HealthWatch::add_mocap(Stamp now, const MocapSample& mocap) {

@@ -40,13 +40,22 @@ class HealthWatch {
   std::vector<Event> update(Stamp now, const Flight& flight);
 
  private:
+  /// What is wrong with images: it is told if it lasts, and over once it has been gone for long.
+  struct Finding {
+    int frames = 0;     ///< in a row that had it
+    Stamp newest = -1;  ///< the last of them; none: -1
+    bool told = false;
+    void add(Stamp now, bool found) {
+      frames = found ? frames + 1 : 0;
+      if (found) newest = now;
+    }
+  };
   /// One depth camera's images against its usual ones.
   struct Images {
     double usual_valid = -1;  ///< share; -1: none yet
     double usual_rough = -1;
     double usual_holes = -1;
-    int blind = 0, rough = 0, holes = 0;  ///< frames in a row
-    bool told_blind = false, told_rough = false, told_holes = false;
+    Finding blind, rough, holes;
   };
   /// Something that must last before it is told.
   struct Lasting {

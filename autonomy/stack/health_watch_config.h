@@ -13,6 +13,7 @@ struct HealthWatchConfig {
   double rough_factor = 2;          ///< of the usual roughness of a depth image
   double rough_fraction = 0.03;     ///< and this, of the depth: five times a D430's at 1.5 m
   int frames = 5;                   ///< in a row
+  double sound_s = 1;               ///< [E] of ten frames that are as likely noisy as not, none
   double attitude_limit_rad = 0.2;  ///< a tenth of it is what two sound estimates differ by
   double off_path_m = 0.8;          ///< sound flights stay below 0.3
   double lasting_s = 0.2;           ///< of the two above
@@ -30,6 +31,7 @@ struct HealthWatchConfig {
     f("rough_fraction", rough_fraction,
       "if its pixels lie further than this, of their depth, off their neighbours' mean");
     f("frames", frames, "in a row");
+    f("sound_s", sound_s, "for so long nothing of the kind, and it is over");
     f("attitude_limit_rad", attitude_limit_rad,
       "autopilot and odometry contradict each other if their verticals differ by more");
     f("off_path_m", off_path_m, "the vehicle is off its path if it is further from its setpoint");
@@ -38,6 +40,7 @@ struct HealthWatchConfig {
     f.check(holes_share > 0 && holes_share < 1, "0 < holes_share < 1");
     f.check(field_step_gauss > 0, "field_step_gauss > 0");
     f.check(rough_factor > 1 && rough_fraction > 0, "rough_factor > 1, rough_fraction > 0");
+    f.check(sound_s >= 0, "sound_s >= 0");
     f.check(frames >= 1 && frames <= 1000, "1 <= frames <= 1000");
     f.check(attitude_limit_rad > 0 && off_path_m > 0 && lasting_s >= 0,
             "attitude_limit_rad, off_path_m > 0, lasting_s >= 0");

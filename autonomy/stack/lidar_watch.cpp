@@ -83,7 +83,17 @@ std::optional<std::string_view> LidarWatch::update(Stamp now) {
   if (last_scan_ < 0) return std::nullopt;
   const State state = newest(now);
   if (state == state_) return std::nullopt;
-  if (state == State::kSound && sound_in_a_row_ < config_.sound_scans) return std::nullopt;
+  if (state == State::kSound && sound_in_a_row_ < patience_) return std::nullopt;
+  if (state == State::kSound) {
+    called_sound_ = now;
+  } else if (state_ == State::kSound) {
+    // What comes and goes is told a few times, not each time.
+    constexpr int kMostScans = 100;
+    const bool relapse =
+        called_sound_ >= 0 && now - called_sound_ < from_seconds(config_.relapse_s);
+    patience_ = relapse ? std::min(2 * patience_, std::max(kMostScans, config_.sound_scans))
+                        : config_.sound_scans;
+  }
   state_ = state;
   switch (state) {
     case State::kSilent:

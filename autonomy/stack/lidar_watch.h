@@ -24,6 +24,7 @@ struct LidarWatchConfig {
   double memory_scans = 20;
   int false_scans = 3;
   int sound_scans = 3;
+  double relapse_s = 10;
 
   void fields(auto& f) {
     f("silent_after_s", silent_after_s, "without a scan for longer: silent");
@@ -47,9 +48,13 @@ struct LidarWatchConfig {
     f("memory_scans", memory_scans, "over which the usual shares are averaged");
     f("false_scans", false_scans,
       "in a row before returns are called false: a turn among shrubs makes one or two look so");
-    f("sound_scans", sound_scans, "in a row before it is called sound again");
+    f("sound_scans", sound_scans,
+      "in a row before it is called sound again; after each relapse within relapse_s twice as "
+      "many");
+    f("relapse_s", relapse_s, "a fault within this of the last one's end is a relapse");
     f.check(silent_after_s > 0 && memory_scans >= 1, "silent_after_s > 0, memory_scans >= 1");
     f.check(refused_fraction > 0 && refused_fraction < 1, "0 < refused_fraction < 1");
+    f.check(relapse_s >= 0, "relapse_s >= 0");
     f.check(false_scans >= 1 && sound_scans >= 1, "false_scans >= 1, sound_scans >= 1");
     f.check(firing_period_s >= 1e-7 && firing_period_s <= 1e-3, "1e-7 <= firing_period_s <= 1e-3");
     f.check(noise_factor > 1 && noise_m > 0, "noise_factor > 1, noise_m > 0");
@@ -63,7 +68,8 @@ struct LidarWatchConfig {
 /// without a return, or with one elsewhere, is the device's doing.
 class LidarWatch {
  public:
-  explicit LidarWatch(const LidarWatchConfig& config) : config_(config) {}
+  explicit LidarWatch(const LidarWatchConfig& config)
+      : config_(config), patience_(config.sound_scans) {}
 
   /// What the firings between returns of one surface did.
   struct Survey {
@@ -99,6 +105,8 @@ class LidarWatch {
   int noisy_in_a_row_ = 0;     ///< scans
   int refused_in_a_row_ = 0;   ///< scans
   int sound_in_a_row_ = 0;
+  int patience_;                 ///< scans in a row before it is called sound again, this time
+  Stamp called_sound_ = -1;      ///< when it last was; never: -1
   State state_ = State::kSound;  ///< as told
 };
 

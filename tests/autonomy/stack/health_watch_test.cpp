@@ -95,6 +95,19 @@ TEST(HealthWatch, TellsABlindedCameraAndANoisyOne) {
   EXPECT_EQ(camera.told, "depth noisy;");
 }
 
+TEST(HealthWatch, TellsNoiseThatComesAndGoesOnce) {
+  Camera camera;
+  camera.run(40, 0, 0.9);
+  camera.run(10, 0.05, 0.9);
+  for (int i = 0; i < 20; ++i) {
+    camera.run(3, 0, 0.9);
+    camera.run(6, 0.05, 0.9);
+  }
+  EXPECT_EQ(camera.told, "depth noisy;");
+  camera.run(20, 0, 0.9);
+  EXPECT_EQ(camera.told, "depth noisy;depth not noisy any more;");
+}
+
 // Above the edge of a roof there is nothing to measure; the LiDAR says so.
 TEST(HealthWatch, TakesAViewOfNothingForNoBlindness) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -90,6 +91,32 @@ TEST(LidarWatch, SaysOnceThatItIsSilentAndOnceThatItIsBack) {
   for (int i = 0; i < 10; ++i) w.empty_frame();
   for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
   EXPECT_EQ(w.told(), "2:lidar silent;12:lidar sound again;");
+}
+
+// Half of the frames lost for a minute and more: a handful of events, not one for each gap.
+TEST(LidarWatch, TellsWhatComesAndGoesAFewTimesNotEachTime) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    RandomStream lost(seed, "lost");
+    Watching w(seed);
+    for (int i = 0; i < 800; ++i) {
+      if (lost.uniform() < 0.5) {
+        w.empty_frame();
+      } else {
+        w.frame({}, matched(1400, 1500));
+      }
+    }
+    const std::string told = w.told();
+    const auto changes = std::count(told.begin(), told.end(), ';');
+    EXPECT_GE(changes, 1) << seed;
+    EXPECT_LE(changes, 16) << told;
+    for (int i = 0; i < 250; ++i) w.frame({}, matched(1400, 1500));
+    EXPECT_NE(w.told().find("lidar sound again"), std::string::npos) << seed;
+    // Long after, a fault is one by itself again.
+    w.count_from_here();
+    for (int i = 0; i < 5; ++i) w.empty_frame();
+    for (int i = 0; i < 5; ++i) w.frame({}, matched(1400, 1500));
+    EXPECT_EQ(w.told(), "2:lidar silent;7:lidar sound again;") << seed;
+  }
 }
 
 TEST(LidarWatch, NoticesAFifthOfTheReturnsMissing) {

@@ -142,7 +142,7 @@ void HealthWatch::add_scan(Stamp now, const LidarScanPtr& scan) {
 
 // Into the sky and close before the ground there is nothing to measure, and no fault in it. The
 // surfaces that the LiDAR has met within the camera's reach and view, a sound camera measures.
-bool HealthWatch::sees_nothing_either(const DepthImage& image) const {
+bool HealthWatch::is_excused(const DepthImage& image) const {
   constexpr Stamp kFresh = kNanosecondsPerSecond / 2;
   constexpr double kNearest_m = 0.5, kReach_m = 5;  // what any stereo depth camera measures
   constexpr int kFew = 100;                         // points
@@ -172,16 +172,16 @@ void HealthWatch::add_depth(Stamp now, const DepthImage& image) {
   if (images.usual_valid < 0) images.usual_valid = seen.valid;
   if (images.usual_rough < 0 && seen.rough > 0) images.usual_rough = seen.rough;
   const bool blind = seen.valid < config_.blind_share * images.usual_valid;
-  const bool nothing_there = blind && sees_nothing_either(image);
+  const bool excused = blind && is_excused(image);
   const bool rough = images.usual_rough > 0 && seen.rough > config_.rough_fraction &&
                      seen.rough > config_.rough_factor * images.usual_rough;
   if (images.usual_holes < 0 && seen.surfaces) images.usual_holes = seen.holes;
-  const bool tells = !blind && seen.surfaces;
+  const bool tells = (!blind || excused) && seen.surfaces;
   constexpr double kOver = 0.5;  // of the limit: it has ended
   const double limit = (images.holes.told ? kOver : 1) * config_.holes_share;
   const bool holes = tells && seen.holes > images.usual_holes + limit;
   if (tells) images.holes.add(now, holes);
-  if (!nothing_there) images.blind.add(now, blind);
+  if (!excused) images.blind.add(now, blind);
   images.rough.add(now, rough);
   // What is wrong does not become usual.
   if (!blind) images.usual_valid += (seen.valid - images.usual_valid) / kImageMemory;

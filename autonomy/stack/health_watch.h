@@ -68,8 +68,8 @@ class HealthWatch {
   StreamWatch& stream(const std::string& name, const StreamWatchConfig& config);
   void report(Stamp now, EventKind kind, std::string detail);
   void tell_images(Stamp now, const std::string& name, Images& images);
-  /// Whether a camera that measures little has little before it, as the LiDAR sees it.
-  [[nodiscard]] bool sees_nothing_either(const DepthImage& image) const;
+  /// Whether a camera that measures little has little before it, by what the LiDAR meets.
+  [[nodiscard]] bool is_excused(const DepthImage& image) const;
 
   HealthWatchConfig config_;
   VehicleConfig vehicle_;

@@ -52,10 +52,17 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   const double share = static_cast<double>(s.spikes) / s.between;
   if (usual_spikes_ < 0) usual_spikes_ = share;
   missing_ = s.missing > config_.missing_share * s.between;
-  const bool spikes = share > usual_spikes_ + config_.false_share;
+  if (usual_between_ < 0) usual_between_ = s.between;
+  // Among leaves few firings lie between returns of one surface, and more of those few lie so by
+  // chance.
+  const double fewer = std::max(1.0, usual_between_ / s.between);
+  const bool spikes = share > usual_spikes_ + std::sqrt(fewer) * config_.false_share;
   spikes_in_a_row_ = spikes ? spikes_in_a_row_ + 1 : 0;
   // What is false does not become usual.
-  if (!spikes) usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
+  if (!spikes) {
+    usual_spikes_ += (share - usual_spikes_) / config_.memory_scans;
+    usual_between_ += (s.between - usual_between_) / config_.memory_scans;
+  }
   if (usual_noise_m_ < 0) usual_noise_m_ = s.noise_m;
   const bool noisy =
       s.noise_m > config_.noise_m && s.noise_m > config_.noise_factor * usual_noise_m_;

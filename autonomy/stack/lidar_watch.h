@@ -39,7 +39,7 @@ struct LidarWatchConfig {
       "(forest 0.04-0.10, garage 0.01-0.04; a fifth lost: above 0.18)");
     f("false_share", false_share,
       "share of spikes above the usual one: returns are false (sound, above usual: 0.03; a tenth "
-      "false: 0.07)");
+      "false: 0.07), more where fewer firings than usual lie between returns of one surface");
     f("refused_fraction", refused_fraction,
       "less than this share of the usual matched share: returns are false");
     f("noise_factor", noise_factor,
@@ -98,6 +98,7 @@ class LidarWatch {
   LidarWatchConfig config_;
   Stamp last_scan_ = -1;       ///< with returns; none yet: -1
   double usual_spikes_ = -1;   ///< share; none yet: -1
+  double usual_between_ = -1;  ///< firings; none yet: -1
   double usual_noise_m_ = -1;  ///< of the ranges; none yet: -1
   double usual_matched_ = -1;  ///< share of the scan's points; none yet: -1
   bool missing_ = false;       ///< in the newest scan

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -19,6 +20,7 @@ struct Flaws {
   double missing = 0.005;  ///< share of the returns lost
   double spikes = 0;       ///< share at any range
   double noise_m = 0;      ///< RMS of the ranges
+  double leaves = 0;       ///< not the device's: share of the view that a crown fills
 };
 
 /// A scan in a room with a clutter of poles, `clutter` of the firings on one.
@@ -30,6 +32,10 @@ LidarScan make_scan(Stamp end, const Flaws& flaws, double clutter, RandomStream&
     const double angle = 2e-3 * i;
     double range = 5 / std::max(std::abs(std::cos(angle)), std::abs(std::sin(angle)));
     if (random.uniform() < clutter) range *= 0.6;
+    if (flaws.leaves > 0 && std::remainder(angle, 2 * std::numbers::pi) + std::numbers::pi <
+                                2 * std::numbers::pi * flaws.leaves) {
+      range = random.uniform(2, 2.9);
+    }
     if (random.uniform() < flaws.missing) continue;
     if (random.uniform() < flaws.spikes) range = random.uniform(0.5, 40);
     if (flaws.noise_m > 0) range += flaws.noise_m * random.normal();
@@ -199,6 +205,20 @@ TEST(LidarWatch, TwoOddScansAreNotFalseThreeAre) {
     for (int i = 0; i < 5; ++i) w.frame({.spikes = 0.1}, matched(1400, 1500));
     for (int i = 0; i < 4; ++i) w.frame({}, matched(1400, 1500));
     EXPECT_EQ(w.told(), "6:lidar returns false;11:lidar sound again;");
+  }
+}
+
+// Before a crown few firings lie between returns of one surface, and leaves stand before and
+// behind.
+TEST(LidarWatch, ACrownThatFillsTheViewIsNoFalseReturns) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Watching w(seed);
+    for (int i = 0; i < 10; ++i) w.frame({.leaves = 0.75}, matched(1400, 1500));
+    // That leaves lie loosely is noise to who has seen but walls without any.
+    EXPECT_EQ(w.told().find("false"), std::string::npos) << seed;
+    w.count_from_here();
+    for (int i = 0; i < 5; ++i) w.frame({.spikes = 0.2, .leaves = 0.75}, matched(1400, 1500));
+    EXPECT_EQ(w.told(), "2:lidar returns false;") << seed;
   }
 }
 

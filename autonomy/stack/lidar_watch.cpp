@@ -55,8 +55,8 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   if (usual_between_ < 0) usual_between_ = s.between;
   // Among leaves few firings lie between returns of one surface, and more of those few lie so by
   // chance.
-  const double fewer = std::max(1.0, usual_between_ / s.between);
-  const bool spikes = share > usual_spikes_ + std::sqrt(fewer) * config_.false_share;
+  const double fewer = std::sqrt(std::max(1.0, usual_between_ / s.between));
+  const bool spikes = share > usual_spikes_ + fewer * config_.false_share;
   spikes_in_a_row_ = spikes ? spikes_in_a_row_ + 1 : 0;
   // What is false does not become usual.
   if (!spikes) {
@@ -65,7 +65,7 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   }
   if (usual_noise_m_ < 0) usual_noise_m_ = s.noise_m;
   const bool noisy =
-      s.noise_m > config_.noise_m && s.noise_m > config_.noise_factor * usual_noise_m_;
+      s.noise_m > fewer * std::max(config_.noise_m, config_.noise_factor * usual_noise_m_);
   noisy_in_a_row_ = noisy ? noisy_in_a_row_ + 1 : 0;
   if (!noisy) usual_noise_m_ += (s.noise_m - usual_noise_m_) / config_.memory_scans;
   const bool faulty = missing_ || spikes || noisy || refused_in_a_row_ > 0;

@@ -238,7 +238,7 @@ std::vector<FigureInfo> flight_figures() {
        "sum of the true heading's changes"},
       {"yaw.fastest_radps", "fastest turn", "rad/s", kNeither, false, "about the vertical"},
       {"yaw.spins", "spins", "", kNeither, false,
-       "turns about the vertical faster than 1.5 rad/s, which planned headings never are"},
+       "turns about the vertical faster than 2.25 rad/s, which planned headings never are"},
       {"clearance.min_m", "least clearance", "m", kMore, true,
        "airframe to the nearest surface on the way, leaves left out; 5 m stand for 5 m and "
        "more"},

@@ -11,9 +11,9 @@ namespace arex::sim {
 /// this.
 class YawMeter {
  public:
-  /// A rate beyond which a turn counts as a spin: what planned headings never exceed
-  /// (planning.yaw).
-  static constexpr double kSpin_radps = 1.5;
+  /// A rate beyond which a turn counts as a spin: half as fast again as headings are planned
+  /// (planning.yaw), so that one that overshoots is none.
+  static constexpr double kSpin_radps = 2.25;
 
   /// After each physics tick.
   void add(const Truth& truth) {

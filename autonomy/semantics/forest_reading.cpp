@@ -175,6 +175,23 @@ struct Crown {
   }
 };
 
+/// A corner or a window's frame looks like a stem, and lies in a plane that goes on.
+bool is_part_of_wall(const Stem& stem, const WorkingCloud& cloud, const ColumnIndex& index,
+                     const std::vector<float>& heights, const std::vector<bool>& on_wall) {
+  constexpr double kFrom = 0.5, kTo = 2.5;  // m above the ground
+  int points = 0, of_wall = 0;
+  index.within(static_cast<float>(stem.centre.x()), static_cast<float>(stem.centre.y()),
+               static_cast<float>(stem.radius + kBark), [&](std::uint32_t i) {
+                 const auto h = static_cast<double>(heights[i]);
+                 if (h < kFrom || h > kTo) return;
+                 const Vec2 p = flat(cloud.points[i]);
+                 if (std::abs(stem.distance({p.x(), p.y(), h})) > kBark) return;
+                 ++points;
+                 of_wall += on_wall[i];
+               });
+  return 2 * of_wall > points;
+}
+
 SemanticObject post_of(const StemEvidence& e, const Raster& ground, double top) {
   const double base = ground.interpolate(e.stem.centre.x(), e.stem.centre.y());
   SemanticObject object;
@@ -189,7 +206,8 @@ SemanticObject post_of(const StemEvidence& e, const Raster& ground, double top) 
 
 }  // namespace
 
-SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config) {
+SceneReading read_forest(const WorkingCloud& cloud, const std::vector<bool>& on_wall,
+                         const SemanticConfig& config) {
   SceneReading reading;
   reading.ground = fit_ground(cloud, config.ground_cell_m);
   reading.heights = heights_above(cloud.points, reading.ground);
@@ -198,8 +216,15 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
   const ColumnIndex index(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
   std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
   std::vector<StemEvidence> slender = find_slender_stems(cloud, index, heights, config.stem);
-  const std::vector<StemEvidence> posts = take_posts(slender, stems, cloud, index, heights);
+  std::vector<StemEvidence> posts = take_posts(slender, stems, cloud, index, heights);
   add_slender_stems(slender, stems);
+  if (!on_wall.empty()) {
+    const auto of_wall = [&](const StemEvidence& e) {
+      return is_part_of_wall(e.stem, cloud, index, heights, on_wall);
+    };
+    std::erase_if(stems, of_wall);
+    std::erase_if(posts, of_wall);
+  }
 
   const StemFollower follower(cloud, index, heights);
   const auto label = [&](const StemEvidence& e, SemanticClass kind) {
@@ -227,13 +252,15 @@ SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config
     SemanticClass& kind = reading.labels[i];
     const Vec2 p = cloud.points[i].head<2>().cast<double>();
     const std::size_t tree = nearest.at(p);
-    if (kind == SemanticClass::kUnlabelled) {
+    if (kind == SemanticClass::kUnlabelled && !on_wall.empty() && on_wall[i]) {
+      kind = SemanticClass::kWall;
+    } else if (kind == SemanticClass::kUnlabelled) {
       kind = std::abs(h) <= kGroundThickness ? SemanticClass::kGround
              : h < -kGroundThickness         ? SemanticClass::kUnlabelled
              : h < kCrownBase                ? SemanticClass::kUndergrowth
                                              : SemanticClass::kCanopy;
     }
-    if (h > kGroundThickness && kind != SemanticClass::kPillar) {
+    if (h > kGroundThickness && kind != SemanticClass::kPillar && kind != SemanticClass::kWall) {
       crowns[tree].add(cloud.points[i].z(), canopy.cell_of(p.x(), p.y()), h > kCrownBase);
     }
   }

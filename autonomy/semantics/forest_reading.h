@@ -20,7 +20,9 @@ struct SceneReading {
 /// A stem found at breast height is followed up and down by circles of a radius that tapers, as
 /// long as there are points on them. What is no ground and no stem belongs to the nearest stem's
 /// tree: its height is that of its fifth highest point, its canopy the area of its points above
-/// 1.5 m seen from above.
-SceneReading read_forest(const WorkingCloud& cloud, const SemanticConfig& config);
+/// 1.5 m seen from above. Walls of what stands among the trees are neither.
+/// @param on_wall of the points, as points_on_walls; empty: there are no walls
+SceneReading read_forest(const WorkingCloud& cloud, const std::vector<bool>& on_wall,
+                         const SemanticConfig& config);
 
 }  // namespace arex

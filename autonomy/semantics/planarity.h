@@ -1,13 +1,24 @@
 #pragma once
 
+#include <vector>
+
 #include "semantics/working_cloud.h"
 
 namespace arex {
 
-/// Of the 0.4 m cubes of a cloud that hold a surface other than level ground, the share in which
-/// that surface is plane and goes on in the cube beside it: high where people build, low where
-/// plants grow. A stem's bark is as good as plane in a cube, but curves away beside it. 0 without
-/// any such cube.
-double planar_fraction(const WorkingCloud& cloud);
+/// What tells where people build from where plants grow, in cubes of 0.4 m.
+struct Planarity {
+  /// Of the cubes that hold a surface other than level ground, the share in which that surface is
+  /// plane and goes on in the cube beside it. A stem's bark is as good as plane in a cube, but
+  /// curves away beside it. 0 without any such cube.
+  double fraction = 0;
+  /// Of the columns with a level surface, the share with another one 2 m and more above it:
+  /// ceilings. A wall beside a wood has none.
+  double roofed = 0;
+};
+Planarity planarity(const WorkingCloud& cloud);
+
+/// Which points lie in a cube whose upright surface is plane and goes on beside it.
+std::vector<bool> points_on_walls(const WorkingCloud& cloud);
 
 }  // namespace arex

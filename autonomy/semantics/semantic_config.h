@@ -87,6 +87,7 @@ struct SemanticConfig {
   double voxel_m = 0.04;
   double ground_cell_m = 0.5;
   double planar_fraction = 0.05;
+  double roofed_fraction = 0.1;
   StemConfig stem;
   GarageConfig garage;
 
@@ -96,11 +97,14 @@ struct SemanticConfig {
     f("ground_cell_m", ground_cell_m, "of the ground model's grid");
     f("planar_fraction", planar_fraction,
       "auto: a garage if at least this share of what is no level ground is plane");
+    f("roofed_fraction", roofed_fraction,
+      "and if above at least this share of the ground there is a ceiling");
     f("stem", stem, "how stems are found");
     f("garage", garage, "how the parts of a garage are found");
     f.check(voxel_m >= 0.005 && voxel_m <= 0.2, "0.005 <= voxel_m <= 0.2");
     f.check(ground_cell_m >= 0.2 && ground_cell_m <= 5, "0.2 <= ground_cell_m <= 5");
     f.check(planar_fraction > 0 && planar_fraction < 1, "0 < planar_fraction < 1");
+    f.check(roofed_fraction >= 0 && roofed_fraction < 1, "0 <= roofed_fraction < 1");
   }
 };
 

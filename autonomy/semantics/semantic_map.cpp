@@ -40,15 +40,20 @@ SemanticMap build_semantic_map(std::span<const Vec3f> points, std::span<const Ve
   map.labels.assign(points.size(), SemanticClass::kUnlabelled);
   const WorkingCloud cloud(points, config.voxel_m);
   map.points_used = cloud.points.size();
-  map.planar_fraction = planar_fraction(cloud);
+  map.planarity = planarity(cloud);
   map.scene = config.scene;
   if (map.scene == SceneKind::kAuto) {
-    map.scene =
-        map.planar_fraction >= config.planar_fraction ? SceneKind::kGarage : SceneKind::kForest;
+    const bool built = map.planarity.fraction >= config.planar_fraction &&
+                       map.planarity.roofed >= config.roofed_fraction;
+    map.scene = built ? SceneKind::kGarage : SceneKind::kForest;
   }
   if (cloud.points.empty()) return map;
-  SceneReading reading = map.scene == SceneKind::kGarage ? read_garage(cloud, path, config)
-                                                         : read_forest(cloud, config);
+  constexpr double kSomeWalls = 0.002;  // planes of all upright surfaces; woods: below 0.001
+  const bool walls = map.scene == SceneKind::kForest && map.planarity.fraction > kSomeWalls;
+  SceneReading reading =
+      map.scene == SceneKind::kGarage
+          ? read_garage(cloud, path, config)
+          : read_forest(cloud, walls ? points_on_walls(cloud) : std::vector<bool>(), config);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (cloud.of_input[i] != WorkingCloud::kNone) map.labels[i] = reading.labels[cloud.of_input[i]];
   }

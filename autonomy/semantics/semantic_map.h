@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "math/types.h"
+#include "semantics/planarity.h"
 #include "semantics/raster.h"
 #include "semantics/semantic_config.h"
 
@@ -59,7 +60,7 @@ struct SemanticMap {
   Raster canopy;                         ///< greatest height above it, m; NaN: no point
   Raster density;                        ///< points of the thinned cloud in a cell
   std::size_t points_used = 0;           ///< after thinning and without outliers
-  double planar_fraction = 0;            ///< what the choice of the scene rests on
+  Planarity planarity;                   ///< what the choice of the scene rests on
 
   [[nodiscard]] std::size_t count(SemanticClass kind) const;
 };

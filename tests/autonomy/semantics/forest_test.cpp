@@ -105,6 +105,70 @@ TEST(ForestMap, TakesNoFoliageForStems) {
   }
 }
 
+/// A wall from one foot to the other, 4 m high, with windows that lie 0.2 m deep in it.
+void add_wall(AnalyticForest& cloud, const Vec2& from, const Vec2& to, double spacing_m) {
+  const Vec2 along = (to - from).normalized(), inwards(-along.y(), along.x());
+  for (double s = 0; s < (to - from).norm(); s += spacing_m) {
+    for (double h = 0; h < 4; h += spacing_m) {
+      const bool window = std::fmod(s, 3) > 1.8 && std::fmod(s, 3) < 2.8 && h > 1 && h < 2.2;
+      const Vec2 p = from + s * along + (window ? 0.2 : 0.0) * inwards;
+      cloud.add({p.x(), p.y(), cloud.ground(p) + h});
+    }
+  }
+}
+
+TEST(ForestMap, AHouseAmongTreesMakesNoGarageOfThem) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    Stand stand({0.05, 0.0}, seed);
+    const std::size_t before = stand.cloud.points.size();
+    const double step = stand.cloud.spacing_m;
+    add_wall(stand.cloud, {-8, 8}, {8, 8}, step);  // a row of houses
+    add_wall(stand.cloud, {7.5, -7}, {7.5, -2}, step);
+    add_wall(stand.cloud, {7.5, -7}, {9, -7}, step);
+    const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
+    EXPECT_GT(map.planarity.fraction, 0.05) << seed;
+    EXPECT_LT(map.planarity.roofed, 0.05) << seed;
+    EXPECT_EQ(map.scene, SceneKind::kForest) << seed;
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), stand.stems.size()) << seed;
+    for (const AnalyticStem& stem : stand.stems) {
+      EXPECT_NE(stem_near(map, stem.at_breast()), nullptr) << seed << ", radius " << stem.radius;
+    }
+    const auto walls = std::count(map.labels.begin() + static_cast<std::ptrdiff_t>(before),
+                                  map.labels.end(), SemanticClass::kWall);
+    EXPECT_GT(static_cast<double>(walls),
+              0.7 * static_cast<double>(stand.cloud.points.size() - before))
+        << seed;
+  }
+}
+
+// Terraces: level strips with a wall of 1.5 m from one to the next.
+TEST(ForestMap, FindsTheTreesOfATerracedSlope) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    AnalyticForest cloud(Vec2::Zero(), seed);
+    constexpr double kStep = 1.5, kWidth = 4;
+    std::vector<Vec2> feet;
+    for (int terrace = 0; terrace < 4; ++terrace) {
+      const double z = terrace * kStep, y0 = terrace * kWidth;
+      for (double x = -8; x < 8; x += 0.1) {
+        for (double y = y0; y < y0 + kWidth; y += 0.1) cloud.add({x, y, z});
+        for (double h = 0; terrace < 3 && h < kStep; h += 0.06) cloud.add({x, y0 + kWidth, z + h});
+      }
+      for (const double x : {-5.0, 0.0, 5.0}) {
+        AnalyticForest tree(Vec2::Zero(), seed + 10 * static_cast<std::uint64_t>(terrace));
+        const Vec2 foot(x + cloud.random().uniform(-1, 1), y0 + cloud.random().uniform(1.2, 2.8));
+        tree.add_stem({.foot = foot, .radius = 0.12});
+        for (const Vec3f& p : tree.points)
+          cloud.points.emplace_back(p + Vec3f(0, 0, static_cast<float>(z)));
+        feet.push_back(foot);
+      }
+    }
+    const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+    EXPECT_EQ(map.scene, SceneKind::kForest) << seed;
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), feet.size()) << seed;
+    for (const Vec2& foot : feet) EXPECT_NE(stem_near(map, foot), nullptr) << seed;
+  }
+}
+
 TEST(ForestMap, LabelsGroundStemsAndLeaves) {
   const Stand stand({0.2, 0.1}, 5);
   const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});

@@ -121,7 +121,7 @@ TEST(GarageMap, FindsPillarsCarsWallsAndTheRamp) {
     AnalyticGarage garage(yaw, {12, -7, -8}, 1);
     garage.build();
     const SemanticMap map = build_semantic_map(garage.points, {}, {});
-    ASSERT_EQ(map.scene, SceneKind::kGarage) << map.planar_fraction;
+    ASSERT_EQ(map.scene, SceneKind::kGarage) << map.planarity.fraction;
     EXPECT_EQ(map.count(SemanticClass::kPillar), garage.pillars.size()) << yaw;
     for (const Vec2& pillar : garage.pillars) {
       const Vec2 p = garage.place({pillar.x(), pillar.y(), 0}).head<2>();

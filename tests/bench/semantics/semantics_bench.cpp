@@ -185,8 +185,8 @@ int main_of(const std::vector<std::string>& words) {
     const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     const auto score = sim::score_semantics(map, cloud.points_O, cloud.X_WO, world);
     std::printf("seed %llu: %zu points, planar %.2f, %.2f s\n",
-                static_cast<unsigned long long>(seed), cloud.points_O.size(), map.planar_fraction,
-                seconds);
+                static_cast<unsigned long long>(seed), cloud.points_O.size(),
+                map.planarity.fraction, seconds);
     for (std::size_t i = 0; i < sim::kScoredClasses.size(); ++i) {
       const auto& c = score.classes[i];
       if (c.found == 0 && c.mapped == 0) continue;

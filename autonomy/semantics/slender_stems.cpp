@@ -355,6 +355,17 @@ void add_slender_stems(const std::vector<StemEvidence>& slender, std::vector<Ste
   }
 }
 
+/// Of a cloud that somebody has cut off above the stems, none shows where a tree goes on.
+bool ends_below_trees(const std::vector<float>& heights) {
+  constexpr double kHardly = 0.001;  // of what stands up
+  std::size_t upright = 0, above = 0;
+  for (const float height : heights) {
+    upright += static_cast<double>(height) > kShaftLow;
+    above += static_cast<double>(height) > kPostTop + 0.5 * kAbove;
+  }
+  return static_cast<double>(above) < kHardly * static_cast<double>(upright);
+}
+
 std::optional<StemEvidence> post_at(const Stem& about, const WorkingCloud& cloud,
                                     const ColumnIndex& index, const std::vector<float>& heights) {
   constexpr double kThickest = 0.15;               // m, radius
@@ -391,6 +402,7 @@ std::vector<StemEvidence> take_posts(std::vector<StemEvidence>& slender,
                                      std::vector<StemEvidence>& stems, const WorkingCloud& cloud,
                                      const ColumnIndex& index, const std::vector<float>& heights) {
   std::vector<StemEvidence> posts;
+  if (ends_below_trees(heights)) return posts;
   for (const std::vector<StemEvidence>* candidates : {&slender, &stems}) {
     for (const StemEvidence& candidate : *candidates) {
       const auto post = post_at(candidate.stem, cloud, index, heights);

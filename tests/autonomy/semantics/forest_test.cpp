@@ -169,6 +169,23 @@ TEST(ForestMap, FindsTheTreesOfATerracedSlope) {
   }
 }
 
+// Of scans for breast heights people keep the lowest metres.
+TEST(ForestMap, TakesTreesOfACloudThatIsCutOffForNoPosts) {
+  for (const double top : {2.5, 2.95, 3.3}) {
+    AnalyticForest whole(Vec2::Zero(), 5);
+    whole.add_ground(8);
+    for (int i = 0; i < 9; ++i) {
+      whole.add_stem({.foot = 4 * Vec2(i % 3 - 1, i / 3 - 1), .radius = 0.06 + 0.01 * i});
+      whole.add_foliage({4.0 * (i % 3 - 1), 4.0 * (i / 3 - 1), 7}, 2, 1500);
+    }
+    std::vector<Vec3f> cut = whole.points;
+    std::erase_if(cut, [&](const Vec3f& p) { return static_cast<double>(p.z()) > top; });
+    const SemanticMap map = build_semantic_map(cut, {}, {});
+    EXPECT_EQ(map.count(SemanticClass::kTrunk), 9U) << top;
+    EXPECT_EQ(map.count(SemanticClass::kPillar), 0U) << top;
+  }
+}
+
 TEST(ForestMap, LabelsGroundStemsAndLeaves) {
   const Stand stand({0.2, 0.1}, 5);
   const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});

@@ -148,7 +148,9 @@ void print_counts(const SemanticMap& map, const CloudFile& cloud, const fs::path
 SemanticMap map_of(const CloudFile& cloud, const std::vector<Vec3f>& path,
                    const SemanticConfig& config, const fs::path& file) {
   try {
-    return build_semantic_map(cloud.points, path, config);
+    SemanticMap map = build_semantic_map(cloud.points, path, config);
+    if (map.points_used > 0) return map;
+    throw ConfigError("its points lie kilometres from each other, expected a cloud of a place");
   } catch (const ConfigError& problem) {
     throw ConfigError(file.string() + ": " + problem.what());
   }

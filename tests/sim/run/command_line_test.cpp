@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -312,6 +313,18 @@ TEST(CommandLine, ScoresTheSemanticMapOfARunAgainstItsWorld) {
       run({"semantics", (folder / "run").string(), "--out", (folder / "other").string()});
   EXPECT_EQ(unfinished.exit_code, 0) << unfinished.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "other/semantic_score.csv"));
+}
+
+TEST(CommandLine, RefusesACloudOfNoPlace) {
+  const TemporaryFolder folder;
+  std::string pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 200\nHEIGHT 1\nDATA ascii\n";
+  for (int i = 0; i < 200; ++i) pcd += fmt::format("{}e7 {}e7 {}e7\n", i, i * i % 101, i % 7);
+  write_text(folder / "far.pcd", pcd);
+  const std::string out = (folder / "map").string();
+  const Result result = run({"semantics", (folder / "far.pcd").string(), "--out", out});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("kilometres from each other"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "map/objects.csv"));
 }
 
 TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {

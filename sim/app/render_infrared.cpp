@@ -139,10 +139,12 @@ int draw_features(const std::filesystem::path& folder, double time_s, double per
   return drawn;
 }
 
-/// Of what the pair suffered then: the picture is what it took, not what the vehicle got.
-std::string faults_at(const std::vector<sim::FaultConfig>& faults, double time_s) {
+/// Where the vehicle got no such image, or another: the picture is what the pair took, or would
+/// have.
+std::string remarks_at(const sim::ScenarioConfig& config, double time_s) {
+  if (!config.draws_infrared()) return "; the vehicle flew without this camera";
   std::string told;
-  for (const sim::FaultConfig& fault : faults) {
+  for (const sim::FaultConfig& fault : config.faults) {
     if (fault.device != "infrared" || !fault.holds(from_seconds(time_s))) continue;
     told += fmt::format("; fault then: infrared {}, so the vehicle did not get this image as it is",
                         sim::kFaultKindNames[static_cast<std::size_t>(fault.kind)]);
@@ -182,7 +184,7 @@ void draw_infrared(const RenderArguments& arguments, const sim::Scenario& scenar
   sim::save_png(picture, arguments.out);
   std::printf("%s: left infrared image of %.3f s, exposed %.3f ms, gain %.2f, %d features%s\n",
               arguments.out.c_str(), time, 1e3 * shot.exposure.exposure_s, shot.exposure.gain,
-              features, faults_at(config.faults, time).c_str());
+              features, remarks_at(config, time).c_str());
 }
 
 }  // namespace arex::app

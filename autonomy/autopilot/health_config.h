@@ -12,6 +12,9 @@ inline constexpr double kFlightImuHz = 1000;
 struct MotorWatchConfig {
   double weak_fraction = 0.07;  ///< of a hovering rotor's thrust; sound flights stay below 0.04
   double weak_s = 1.0;          ///< and for so long
+  double fallen_fraction =
+      0.08;               ///< the same against before; sound flights stay below 0.05, in wind
+  double fallen_s = 1.5;  ///< and for so long
   /// Of a hovering rotor's thrust. One that is weak by 30 % misses 60 % of it where it is told to
   /// give twice as much, one that stands still all that it is told.
   double stopped_fraction = 0.75;
@@ -21,10 +24,15 @@ struct MotorWatchConfig {
     f("weak_fraction", weak_fraction,
       "a rotor that gives this part of its hover thrust less than the others do is weak");
     f("weak_s", weak_s, "for so long");
+    f("fallen_fraction", fallen_fraction,
+      "one that gives this part less than it did before in the flight is weak, whatever the others "
+      "give");
+    f("fallen_s", fallen_s, "for so long");
     f("stopped_fraction", stopped_fraction, "one that gives this part less has stopped");
     f("stopped_s", stopped_s, "for so long");
     f.check(weak_fraction > 0 && stopped_fraction > weak_fraction,
             "0 < weak_fraction < stopped_fraction");
+    f.check(fallen_fraction > 0 && fallen_s > 0, "fallen_fraction, fallen_s > 0");
     f.check(weak_s > 0 && stopped_s > 0, "weak_s, stopped_s > 0");
   }
 };

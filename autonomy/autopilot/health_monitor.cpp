@@ -28,6 +28,7 @@ HealthMonitor::HealthMonitor(const HealthConfig& config, const Eigen::Matrix4d& 
       power_("power", kPowerStream),
       vibration_(config.vibration, kFlightImuHz),
       motors_(config.motor, mix, weight_n),
+      pack_(config.pack_resistance_ohm),
       field_("magnetometer", config.field_step_gauss),
       pressure_("barometer", config.pressure_step_pa),
       voltage_("power", config.voltage_step_v) {}
@@ -69,7 +70,7 @@ void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {
     return;
   }
   motors_.update(flight.missing, dt_s);
-  if (const auto found = motors_.take()) {
+  while (const auto found = motors_.take()) {
     report(now, EventKind::kVehicleFault,
            fmt::format("motor {} {}: {:.0f} % of its hover thrust is missing", found->motor + 1,
                        found->stopped ? "stopped" : "weak", 100 * found->fraction));
@@ -78,6 +79,7 @@ void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {
 
 void HealthMonitor::watch_streams(Stamp now, bool in_air) {
   for (StreamWatch* stream : {&imu_, &magnetometer_, &barometer_, &power_}) {
+    stream->expect(now);
     if (auto change = stream->update(now, in_air)) {
       report(now, EventKind::kSensorFault, *std::move(change));
     }
@@ -104,11 +106,14 @@ void HealthMonitor::watch_tilt(Stamp now, const Flight& flight, double dt_s) {
 
 void HealthMonitor::watch_battery(Stamp now) {
   const auto resistance = pack_.resistance_ohm();
-  const double limit = config_.weak_pack_factor * config_.pack_resistance_ohm;
-  if (!resistance || *resistance < limit || std::exchange(pack_told_, true)) return;
-  report(now, EventKind::kVehicleFault,
-         fmt::format("battery cell weak: the pack's inner resistance is {:.0f} mohm",
-                     1e3 * *resistance));
+  const auto fall_v = pack_.fall_v();
+  const bool resists =
+      resistance && *resistance >= config_.weak_pack_factor * config_.pack_resistance_ohm;
+  if ((!resists && !fall_v) || std::exchange(pack_told_, true)) return;
+  const std::string how =
+      fall_v ? fmt::format("its voltage fell by {:.1f} V at once", *fall_v)
+             : fmt::format("the pack's inner resistance is {:.0f} mohm", 1e3 * *resistance);
+  report(now, EventKind::kVehicleFault, "battery cell weak: " + how);
 }
 
 void HealthMonitor::report(Stamp now, EventKind kind, std::string detail) {

@@ -35,10 +35,28 @@ void MotorWatch::update(const Missing& missing, double dt_s) {
   at_once_n_ += dt_s / (dt_s + kAtOnce_s) * (mix_ * missing.at_once - at_once_n_);
   const Lowest steady = lowest(steady_n_), at_once = lowest(at_once_n_);
   if (grows(weak_, steady, config_.weak_fraction, dt_s, config_.weak_s)) {
-    finding_ = {steady.motor, steady.fraction, false};
+    findings_.push_back({steady.motor, steady.fraction, false});
   }
   if (grows(stopped_, at_once, config_.stopped_fraction, dt_s, config_.stopped_s)) {
-    finding_ = {at_once.motor, at_once.fraction, true};
+    findings_.push_back({at_once.motor, at_once.fraction, true});
+  }
+  compare_with_usual(dt_s);
+}
+
+void MotorWatch::compare_with_usual(double dt_s) {
+  constexpr double kLearnt_s = 3, kMemory_s = 20;
+  constexpr double kBesideOthers = 0.5;  // of the worst: a share of what it lacks is put on others
+  const Vec4 fallen = (usual_.beyond_n - steady_n_) / hover_n_;
+  const bool learns = usual_.learnt_s < kLearnt_s;
+  if (learns) usual_.learnt_s += dt_s;
+  usual_.beyond_n -= dt_s / (learns ? usual_.learnt_s : kMemory_s) * hover_n_ * fallen;
+  const double limit = std::max(config_.fallen_fraction, kBesideOthers * fallen.maxCoeff());
+  for (int motor = 0; motor < 4; ++motor) {
+    const auto i = static_cast<std::size_t>(motor);
+    double& since_s = usual_.fallen_s[i];
+    since_s = !learns && fallen[motor] >= limit ? since_s + dt_s : 0;
+    if (since_s < config_.fallen_s || std::exchange(weak_.told[i], true)) continue;
+    findings_.push_back({motor, fallen[motor], false});
   }
 }
 
@@ -46,10 +64,14 @@ void MotorWatch::reset() {
   steady_n_.setZero();
   at_once_n_.setZero();
   weak_.since_s = stopped_.since_s = 0;
+  usual_ = {};
 }
 
 std::optional<MotorWatch::Finding> MotorWatch::take() {
-  return std::exchange(finding_, std::nullopt);
+  if (findings_.empty()) return std::nullopt;
+  const Finding finding = findings_.front();
+  findings_.pop_front();
+  return finding;
 }
 
 double MotorWatch::weakness() const { return lowest(steady_n_).fraction; }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <optional>
 
 #include "autopilot/health_config.h"
@@ -8,12 +9,14 @@
 
 namespace arex {
 
-/// Finds the rotor that gives less than it is told, without a word from the speed controllers.
+/// Finds the rotors that give less than they are told, without a word from the speed controllers.
 ///
 /// What thrust and torque are missing, by the accelerometer and by what the rate loop has to add,
 /// is shared out among the rotors by the inverse of the allocation. A weak rotor stands out alone.
 /// A shifted centre of mass, drag and wind take from two at once, and a wrong mass from all four:
-/// so what counts is the lowest against the second lowest.
+/// so what counts is the lowest against the second lowest. Of several weak rotors none need stand
+/// out: each counts against what it gave before in this flight, which load and balance do not
+/// change.
 class MotorWatch {
  public:
   /// @param mix the allocation's inverse: wrench (thrust N, torque N m in B) to rotor thrusts
@@ -35,7 +38,7 @@ class MotorWatch {
     double fraction = 0;  ///< of a hovering rotor's thrust that is missing
     bool stopped = false;
   };
-  /// What is new since the last call.
+  /// What is new since the last call, one after the other.
   [[nodiscard]] std::optional<Finding> take();
 
   /// Of the steady shares, the lowest against the second lowest, over a hovering rotor's thrust.
@@ -48,6 +51,12 @@ class MotorWatch {
     double since_s = 0;
     std::array<bool, 4> told{};  ///< of each motor, once a flight
   };
+  /// What a rotor usually gives, and for how long it has given less.
+  struct Usual {
+    Vec4 beyond_n = Vec4::Zero();
+    double learnt_s = 0;
+    std::array<double, 4> fallen_s{};
+  };
   struct Lowest {
     int motor = 0;
     double fraction = 0;
@@ -56,6 +65,8 @@ class MotorWatch {
   static bool grows(Suspicion& suspicion, const Lowest& lowest, double limit, double dt_s,
                     double needed_s);
 
+  void compare_with_usual(double dt_s);
+
   static constexpr double kSteady_s = 1.0, kAtOnce_s = 0.03;  ///< time constants of the means
 
   MotorWatchConfig config_;
@@ -63,7 +74,8 @@ class MotorWatch {
   double hover_n_;
   Vec4 steady_n_ = Vec4::Zero(), at_once_n_ = Vec4::Zero();  ///< of each rotor, beyond its command
   Suspicion weak_, stopped_;
-  std::optional<Finding> finding_;
+  Usual usual_;
+  std::deque<Finding> findings_;
 };
 
 }  // namespace arex

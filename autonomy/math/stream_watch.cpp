@@ -39,6 +39,10 @@ void StreamWatch::learn(double delay_s, double period_s) {
 }
 
 StreamWatch::State StreamWatch::newest(Stamp now, bool lively) const {
+  if (arrived_ < 0) {
+    const bool missed = expected_ >= 0 && now - expected_ > from_seconds(kStart_s);
+    return missed ? State::kSilent : State::kSound;
+  }
   const double silent_s = std::max(config_.silent_s, config_.silent_periods * usual_period_s_);
   const bool knows_period = config_.silent_periods == 0 || readings_ > 0;
   if (knows_period && now - arrived_ > from_seconds(silent_s)) return State::kSilent;
@@ -49,7 +53,6 @@ StreamWatch::State StreamWatch::newest(Stamp now, bool lively) const {
 }
 
 std::optional<std::string> StreamWatch::update(Stamp now, bool lively) {
-  if (arrived_ < 0) return std::nullopt;
   const State state = newest(now, lively);
   if (state != State::kSound) faulty_at_ = now;
   const bool waits = state == State::kSound && now - faulty_at_ < from_seconds(kSoundAfter_s);

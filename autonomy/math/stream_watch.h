@@ -38,6 +38,11 @@ class StreamWatch {
   /// @param values at most kValues of the reading
   void add(Stamp now, Stamp stamp, std::span<const double> values);
 
+  /// Readings are to come from now on: a sensor that has been dead from the start is silent, too.
+  void expect(Stamp now) {
+    if (arrived_ < 0 && expected_ < 0) expected_ = now;
+  }
+
   /// @param lively the vehicle flies: readings that stay the same are no sign of rest
   /// @return what has changed since the last call, for an event: "imu silent", "imu sound again"
   [[nodiscard]] std::optional<std::string> update(Stamp now, bool lively);
@@ -53,11 +58,13 @@ class StreamWatch {
   void learn(double delay_s, double period_s);
 
   static constexpr double kSoundAfter_s = 0.3;  ///< of good readings: so that an event is not two
+  static constexpr double kStart_s = 1;         ///< the first of them may take so long
 
   std::string name_;
   StreamWatchConfig config_;
   std::array<double, kValues> last_{};
-  Stamp arrived_ = -1;  ///< -1: none yet
+  Stamp expected_ = -1;  ///< from then on; -1: it may not be there at all
+  Stamp arrived_ = -1;   ///< -1: none yet
   Stamp stamp_ = 0;
   int readings_ = 0;  ///< learnt from, at most learnt_readings
   int same_ = 0;      ///< in a row

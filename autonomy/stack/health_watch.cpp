@@ -12,10 +12,11 @@ namespace arex {
 namespace {
 
 constexpr double kImuHz = 200;
-constexpr double kImageMemory = 50;  // frames
-constexpr int kPixelStep = 8;        // a survey needs no more of 400,000 pixels
-constexpr int kGlare = 20;           // pixels to each side: beyond what an edge or a twig hides
-constexpr int kFewSurfaces = 300;    // pixels; of fewer no share is told
+constexpr double kImageMemory = 50;    // frames
+constexpr double kGyroStep_radps = 1;  // RMS of all axes; airframes that shake give 0.4
+constexpr int kPixelStep = 8;          // a survey needs no more of 400,000 pixels
+constexpr int kGlare = 20;             // pixels to each side: beyond what an edge or a twig hides
+constexpr int kFewSurfaces = 300;      // pixels; of fewer no share is told
 
 constexpr StreamWatchConfig kImuStream{
     .silent_s = 0.03, .stuck_readings = 20, .late_s = 0.006, .learnt_readings = 100};
@@ -112,11 +113,14 @@ Survey survey(const DepthImage& image) {
 
 }  // namespace
 
-HealthWatch::HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle)
+HealthWatch::HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle,
+                         ExpectedSensors expected)
     : config_(config),
       vehicle_(std::move(vehicle)),
+      expected_(expected),
       vibration_(config.vibration, kImuHz),
-      field_(config.field_step_gauss) {}
+      field_(config.field_step_gauss),
+      gyro_steps_("imu", kGyroStep_radps) {}
 
 StreamWatch& HealthWatch::stream(const std::string& name, const StreamWatchConfig& config) {
   return streams_.try_emplace(name, name, config).first->second;
@@ -128,6 +132,7 @@ void HealthWatch::add_imu(Stamp now, const ImuSample& imu) {
       .add(now, imu.stamp, std::array{w.x(), w.y(), w.z(), a.x(), a.y(), a.z()});
   vibration_.add(w, a);
   field_.add(imu.field_gauss);
+  gyro_steps_.add(w);
 }
 
 void HealthWatch::add_scan(Stamp now, const LidarScanPtr& scan) {
@@ -242,7 +247,14 @@ bool HealthWatch::Lasting::holds(bool now_so, Stamp now, double for_s) {
   return now - since >= from_seconds(for_s) && !std::exchange(told, true);
 }
 
+void HealthWatch::expect(Stamp now) {
+  if (expected_.imu) stream("imu", kImuStream).expect(now);
+  if (expected_.depth) stream("depth", kImageStream).expect(now);
+  if (expected_.infrared) stream("infrared", kImageStream).expect(now);
+}
+
 std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
+  if (flight.armed) expect(now);
   for (auto& [name, stream] : streams_) {
     if (auto change = stream.update(now, flight.in_air)) {
       report(now, EventKind::kSensorFault, *std::move(change));
@@ -253,6 +265,10 @@ std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
   }
   const auto shaken = vibration_.update();
   if (shaken && flight.armed) report(now, EventKind::kVibration, *shaken);
+  const auto imu = streams_.find("imu");
+  const bool faulty = imu != streams_.end() && imu->second.faulty();
+  const bool jumps_about = gyro_steps_.step_rms() > kGyroStep_radps;
+  if (faulty || jumps_about || vibration_.shakes()) imu_faulty_ = now;
   const double difference = flight.attitude_difference_rad;
   if (contradicts_.holds(flight.in_air && difference > config_.attitude_limit_rad, now,
                          config_.lasting_s)) {
@@ -266,6 +282,11 @@ std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
            fmt::format("out of control: {:.1f} m off its path", flight.off_path_m));
   }
   return std::exchange(events_, {});
+}
+
+bool HealthWatch::imu_sound(Stamp now) const {
+  constexpr Stamp kAfter = 2 * kNanosecondsPerSecond;  // until odometry has found itself again
+  return imu_faulty_ < 0 || now - imu_faulty_ > kAfter;
 }
 
 void HealthWatch::report(Stamp now, EventKind kind, std::string detail) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "math/noise_watch.h"
 #include "math/stream_watch.h"
 #include "math/vibration_watch.h"
 #include "messages/events.h"
@@ -15,12 +16,19 @@
 
 namespace arex {
 
+/// What the stack reads of its vehicle's sensors: silent is also what has not said a word by the
+/// time that the vehicle is armed.
+struct ExpectedSensors {
+  bool imu = false, depth = false, infrared = false;
+};
+
 /// What the companion computer can tell of its sensors without a word from their makers: whether
 /// messages come, change and are in time, what a depth image looks like against those before, and
 /// whether the vehicle does as it is told. What the LiDAR's points say is LidarWatch's.
 class HealthWatch {
  public:
-  explicit HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle = {});
+  explicit HealthWatch(const HealthWatchConfig& config, VehicleConfig vehicle = {},
+                       ExpectedSensors expected = {});
 
   // What arrives, between two calls of update.
   void add_imu(Stamp now, const ImuSample& imu);
@@ -38,6 +46,11 @@ class HealthWatch {
   };
   /// @return what is new since the last call
   std::vector<Event> update(Stamp now, const Flight& flight);
+
+  /// Whether nothing has been wrong with the IMU for a while: what else is measured with it, such
+  /// as how well scans match, says something of others. Noise is known here before it is told:
+  /// within two scans of a LiDAR.
+  [[nodiscard]] bool imu_sound(Stamp now) const;
 
  private:
   /// What is wrong with images: it is told if it lasts, and over once it has been gone for long.
@@ -65,6 +78,7 @@ class HealthWatch {
     bool holds(bool now_so, Stamp now, double for_s);
   };
 
+  void expect(Stamp now);
   StreamWatch& stream(const std::string& name, const StreamWatchConfig& config);
   void report(Stamp now, EventKind kind, std::string detail);
   void tell_images(Stamp now, const std::string& name, Images& images);
@@ -73,12 +87,15 @@ class HealthWatch {
 
   HealthWatchConfig config_;
   VehicleConfig vehicle_;
+  ExpectedSensors expected_;
   LidarScanPtr scan_;  ///< the newest of the first LiDAR; null before
   VibrationWatch vibration_;
   std::map<std::string, StreamWatch> streams_;
   std::map<std::string, Images> images_;
   FieldWatch field_;
   Lasting contradicts_, off_path_;
+  NoiseWatch gyro_steps_;
+  Stamp imu_faulty_ = -1;  ///< when it last was; never: -1
   std::vector<Event> events_;
 };
 

@@ -48,14 +48,18 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
   }
   last_scan_ = now;
   const Survey s = survey(scan);
-  if (s.between < config_.least_points) return;
+  if (s.between < config_.least_points) {
+    sound_in_a_row_ = 0;  // nobody knows
+    return;
+  }
   const double share = static_cast<double>(s.spikes) / s.between;
   if (usual_spikes_ < 0) usual_spikes_ = share;
-  missing_ = s.missing > config_.missing_share * s.between;
   if (usual_between_ < 0) usual_between_ = s.between;
   // Among leaves few firings lie between returns of one surface, and more of those few lie so by
   // chance.
   const double fewer = std::sqrt(std::max(1.0, usual_between_ / s.between));
+  const bool missing = s.missing > fewer * config_.missing_share * s.between;
+  missing_in_a_row_ = missing ? missing_in_a_row_ + 1 : 0;
   const bool spikes = share > usual_spikes_ + fewer * config_.false_share;
   spikes_in_a_row_ = spikes ? spikes_in_a_row_ + 1 : 0;
   // What is false does not become usual.
@@ -68,22 +72,30 @@ void LidarWatch::add_scan(Stamp now, const LidarScan& scan) {
       s.noise_m > fewer * std::max(config_.noise_m, config_.noise_factor * usual_noise_m_);
   noisy_in_a_row_ = noisy ? noisy_in_a_row_ + 1 : 0;
   if (!noisy) usual_noise_m_ += (s.noise_m - usual_noise_m_) / config_.memory_scans;
-  const bool faulty = missing_ || spikes || noisy || refused_in_a_row_ > 0;
-  sound_in_a_row_ = faulty ? 0 : sound_in_a_row_ + 1;
+  const bool refused = refused_in_a_row_ > 0 && matches_tell_;
+  sound_in_a_row_ = missing || spikes || noisy || refused ? 0 : sound_in_a_row_ + 1;
+  // Of what was refused before the matches ceased to tell, the returns themselves have the last
+  // word.
+  if (!matches_tell_ && sound_in_a_row_ >= config_.sound_scans) refused_in_a_row_ = 0;
 }
 
-void LidarWatch::add_matched_share(double share) {
-  if (usual_matched_ < 0) usual_matched_ = share;
-  const bool refused = share < config_.refused_fraction * usual_matched_;
+void LidarWatch::add_matched_share(std::optional<double> share) {
+  matches_tell_ = share.has_value();
+  if (!share) {
+    if (refused_in_a_row_ < config_.false_scans) refused_in_a_row_ = 0;
+    return;
+  }
+  if (usual_matched_ < 0) usual_matched_ = *share;
+  const bool refused = *share < config_.refused_fraction * usual_matched_;
   refused_in_a_row_ = refused ? refused_in_a_row_ + 1 : 0;
-  if (!refused) usual_matched_ += (share - usual_matched_) / config_.memory_scans;
+  if (!refused) usual_matched_ += (*share - usual_matched_) / config_.memory_scans;
 }
 
 LidarWatch::State LidarWatch::newest(Stamp now) const {
   if (now - last_scan_ > from_seconds(config_.silent_after_s)) return State::kSilent;
   if (std::max(spikes_in_a_row_, refused_in_a_row_) >= config_.false_scans) return State::kFalse;
   if (noisy_in_a_row_ >= config_.false_scans) return State::kNoisy;
-  return missing_ ? State::kMissing : State::kSound;
+  return missing_in_a_row_ >= config_.false_scans ? State::kMissing : State::kSound;
 }
 
 std::optional<std::string_view> LidarWatch::update(Stamp now) {

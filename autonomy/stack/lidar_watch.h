@@ -47,7 +47,8 @@ struct LidarWatchConfig {
     f("noise_m", noise_m, "and further than this in the mean (sound: 0.01 to 0.02)");
     f("memory_scans", memory_scans, "over which the usual shares are averaged");
     f("false_scans", false_scans,
-      "in a row before returns are called false: a turn among shrubs makes one or two look so");
+      "in a row before returns are called false, missing or noisy: a turn among shrubs makes one "
+      "or two look so");
     f("sound_scans", sound_scans,
       "in a row before it is called sound again; after each relapse within relapse_s twice as "
       "many");
@@ -80,12 +81,17 @@ class LidarWatch {
   };
   [[nodiscard]] Survey survey(const LidarScan& scan) const;
 
+  /// Scans are to come from now on: a LiDAR that has been dead from the start is silent, too.
+  void expect(Stamp now) {
+    if (last_scan_ < 0) last_scan_ = now;
+  }
   void add_scan(Stamp now, const LidarScan& scan);
-  /// What share of a scan's points the odometry matched to its map.
-  void add_matched_share(double share);
+  /// What share of a scan's points the odometry matched to its map; nothing where that says more
+  /// of something else, such as an IMU that fails.
+  void add_matched_share(std::optional<double> share);
   /// @return what changed since the last call, for an event.
   std::optional<std::string_view> update(Stamp now);
-  /// How long there has been no scan; 0 before the first.
+  /// How long there has been no scan; 0 before any is expected.
   [[nodiscard]] double silent_s(Stamp now) const {
     return last_scan_ < 0 ? 0 : to_seconds(now - last_scan_);
   }
@@ -96,15 +102,16 @@ class LidarWatch {
   [[nodiscard]] State newest(Stamp now) const;
 
   LidarWatchConfig config_;
-  Stamp last_scan_ = -1;       ///< with returns; none yet: -1
+  Stamp last_scan_ = -1;       ///< with returns, or when the first was expected; none yet: -1
   double usual_spikes_ = -1;   ///< share; none yet: -1
   double usual_between_ = -1;  ///< firings; none yet: -1
   double usual_noise_m_ = -1;  ///< of the ranges; none yet: -1
   double usual_matched_ = -1;  ///< share of the scan's points; none yet: -1
-  bool missing_ = false;       ///< in the newest scan
+  int missing_in_a_row_ = 0;   ///< scans
   int spikes_in_a_row_ = 0;    ///< scans
   int noisy_in_a_row_ = 0;     ///< scans
   int refused_in_a_row_ = 0;   ///< scans
+  bool matches_tell_ = true;   ///< the newest scan's
   int sound_in_a_row_ = 0;
   int patience_;                 ///< scans in a row before it is called sound again, this time
   Stamp called_sound_ = -1;      ///< when it last was; never: -1

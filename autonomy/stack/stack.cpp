@@ -70,7 +70,7 @@ Stack::Stack(const StackConfig& config, JobQueue& jobs, std::uint64_t seed)
       may_fly_(std::max<std::size_t>(1, config_.odometry.failover.size())),
       switch_(config_.odometry.handover, may_fly_),
       lidar_watch_(config_.odometry.watch),
-      health_watch_(config_.health, config_.vehicle),
+      health_watch_(config_.health, config_.vehicle, sensors_read()),
       energy_(config_.exploration.explorer.consumption),
       perception_(config_, jobs),
       explorer_(make(modules().explorers, config_.exploration.strategy, config_, seed)),
@@ -197,7 +197,9 @@ void Stack::collect(Source& source) {
   }
   if (&source != &flying()) return;
   for (const RegisteredScan& scan : scans) {
-    if (scan.matched_share) lidar_watch_.add_matched_share(*scan.matched_share);
+    const bool tells = scan.matched_share && health_watch_.imu_sound(now_) &&
+                       odometry_.status != OdometryStatus::kLost;
+    lidar_watch_.add_matched_share(tells ? scan.matched_share : std::nullopt);
   }
   set_odometry(switch_.in_common_frame(source.odometry->odometry()));
   for (const RegisteredScan& scan : scans) {
@@ -278,7 +280,16 @@ std::optional<AttitudeCommand> Stack::tick() {
   return control(request_);
 }
 
+ExpectedSensors Stack::sensors_read() const {
+  const bool infrared = std::any_of(sources_.begin(), sources_.end(), [](const Source& source) {
+    return source.odometry->visual_tally().has_value();
+  });
+  return {.imu = true, .depth = config_.mapping.local.use_depth, .infrared = infrared};
+}
+
 void Stack::watch_health() {
+  // Who flies on motion capture may have no LiDAR.
+  if (autopilot_.armed && config_.odometry.source != "mocap") lidar_watch_.expect(now_);
   if (const auto fault = lidar_watch_.update(now_)) {
     report(EventKind::kSensorFault, std::string(*fault));
   }

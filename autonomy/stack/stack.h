@@ -79,6 +79,7 @@ class Stack : public FlightSoftware {
   /// Hands over to another source when the flying one has failed, or back.
   void choose_source();
   void report(EventKind kind, const std::string& detail);
+  [[nodiscard]] ExpectedSensors sensors_read() const;
   void watch_health();
   void set_odometry(const Odometry& odometry);
   [[nodiscard]] bool jumps_to(const Odometry& odometry) const;

@@ -52,6 +52,25 @@ TEST(StreamWatch, TellsWhatIsWrongWithAStreamAndWhenItIsOver) {
   EXPECT_EQ(sensor.told.substr(0, 21), "imu readings missing;");
 }
 
+TEST(StreamWatch, SaysOfASensorThatNeverSpokeOnlyWhatIsExpectedOfIt) {
+  using Does = Sensor::Does;
+  Sensor unknown;
+  unknown.run(5, Does::kNothing);
+  EXPECT_EQ(unknown.told, "");
+  Sensor dead;
+  dead.watch.expect(dead.now);
+  dead.run(0.9, Does::kNothing);  // it may take a moment
+  EXPECT_EQ(dead.told, "");
+  dead.run(5, Does::kNothing);
+  EXPECT_EQ(dead.told, "imu silent;");
+  dead.run(5, Does::kMeasures);
+  EXPECT_EQ(dead.told, "imu silent;imu sound again;");
+  Sensor sound;
+  sound.watch.expect(sound.now);
+  sound.run(5, Does::kMeasures);
+  EXPECT_EQ(sound.told, "");
+}
+
 TEST(StreamWatch, AReadingThatRestsIsNoStuckOneWhileTheVehicleRests) {
   Sensor sensor;
   sensor.run(3, Sensor::Does::kRepeats, 0, 0, false);

@@ -323,6 +323,55 @@ TEST(FieldWatch, AnImuWithoutAMagnetometerHasNoneThatHangs) {
   }
 }
 
+// What the stack reads and has never heard of is told once the vehicle is armed: what is on its way
+// or is not read at all is no fault.
+TEST(HealthWatch, TellsASensorThatHasBeenDeadFromTheStart) {
+  HealthWatch watch(HealthWatchConfig{}, {}, {.imu = true, .depth = true});
+  RandomStream noise(1, "imu");
+  std::string told;
+  const auto run = [&](int from_ms, int to_ms, bool armed) {
+    for (int ms = from_ms; ms < to_ms; ms += 5) {
+      const Stamp now = ms * kNanosecondsPerTick;
+      ImuSample imu;
+      imu.stamp = now;
+      imu.gyro_radps = 0.01 * noise.normal3();
+      watch.add_imu(now, imu);
+      for (const Event& event : watch.update(now, {.armed = armed})) told += event.detail + ";";
+    }
+  };
+  run(0, 5000, false);
+  EXPECT_EQ(told, "");
+  run(5000, 8000, true);
+  EXPECT_EQ(told, "depth silent;");
+}
+
+TEST(HealthWatch, KnowsWhenTheImuSaysNothingOfOthers) {
+  HealthWatch watch{HealthWatchConfig{}};
+  RandomStream noise(2, "imu");
+  Stamp now = 0;
+  const auto run = [&](double seconds, double noise_radps) {
+    for (const Stamp end = now + from_seconds(seconds); now < end; now += 5 * kNanosecondsPerTick) {
+      ImuSample imu;
+      imu.stamp = now;
+      imu.gyro_radps = (0.01 + noise_radps) * noise.normal3();
+      imu.accel_mps2 = Vec3(0, 0, kGravity) + 0.1 * noise.normal3();
+      watch.add_imu(now, imu);
+      watch.update(now, {.armed = true, .in_air = true});
+    }
+  };
+  run(3, 0);
+  EXPECT_TRUE(watch.imu_sound(now));
+  run(0.2, 0.8);  // the fault's own default: before the third scan comes
+  EXPECT_FALSE(watch.imu_sound(now));
+  run(1, 0);
+  EXPECT_FALSE(watch.imu_sound(now));  // what was estimated with it is not over
+  run(5, 0);
+  EXPECT_TRUE(watch.imu_sound(now));
+  now += kNanosecondsPerSecond;  // silent
+  watch.update(now, {.armed = true, .in_air = true});
+  EXPECT_FALSE(watch.imu_sound(now));
+}
+
 TEST(HealthWatch, AutopilotAndOdometryThatContradictEachOtherAreToldIfItLasts) {
   HealthWatch watch{HealthWatchConfig{}};
   std::string told;

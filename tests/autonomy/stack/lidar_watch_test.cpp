@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -57,7 +58,7 @@ class Watching {
     for (int i = 0; i < 25; ++i) frame({}, matched(1400, 1500));
     EXPECT_EQ(told_, "");
   }
-  void frame(const Flaws& flaws, double matched_share) {
+  void frame(const Flaws& flaws, std::optional<double> matched_share) {
     now_ += kFrame;
     const double clutter = 0.04 + 0.02 * std::sin(0.3 * static_cast<double>(frame_));
     watch_.add_scan(now_, make_scan(now_, flaws, clutter, random_));
@@ -131,7 +132,7 @@ TEST(LidarWatch, NoticesAFifthOfTheReturnsMissing) {
     w.count_from_here();
     for (int i = 0; i < 10; ++i) w.frame({.missing = 0.2}, matched(1400, 1500));
     for (int i = 0; i < 10; ++i) w.frame({}, matched(1400, 1500));
-    EXPECT_EQ(w.told(), "0:lidar returns missing;12:lidar sound again;");
+    EXPECT_EQ(w.told(), "2:lidar returns missing;12:lidar sound again;");
   }
 }
 
@@ -190,6 +191,38 @@ TEST(LidarWatch, NoticesReturnsThatFitNothing) {
   EXPECT_EQ(w.told(), "2:lidar returns false;53:lidar sound again;");
 }
 
+// An IMU that fails makes scans fit nothing; that is no news of the LiDAR.
+TEST(LidarWatch, SaysNothingOfMatchesThatTellOfSomethingElse) {
+  Watching w(1);
+  for (int i = 0; i < 2; ++i) w.frame({}, matched(1400, 3500));  // until the IMU's fault is seen
+  for (int i = 0; i < 50; ++i) w.frame({}, std::nullopt);
+  for (int i = 0; i < 2; ++i) w.frame({}, matched(1400, 3500));
+  EXPECT_EQ(w.told(), "");
+  w.count_from_here();
+  for (int i = 0; i < 10; ++i) w.frame({.spikes = 0.1}, std::nullopt);
+  EXPECT_EQ(w.told(), "2:lidar returns false;");
+}
+
+// All returns false: the odometry is lost, and the matches tell no more. That is not the end of it.
+TEST(LidarWatch, StaysFalseWhereNothingTellsThatItIsSoundAgain) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Watching w(seed);
+    w.count_from_here();
+    for (int i = 0; i < 4; ++i) w.frame({.spikes = 1}, matched(100, 1500));
+    for (int i = 0; i < 20; ++i) w.frame({.spikes = 1}, std::nullopt);
+    EXPECT_EQ(w.told(), "2:lidar returns false;") << seed;
+    for (int i = 0; i < 10; ++i) w.frame({}, std::nullopt);
+    EXPECT_EQ(w.told(), "26:lidar sound again;") << seed;
+  }
+}
+
+// One scan across the gaps of a crown is no fault.
+TEST(LidarWatch, TwoScansWithGapsAreNotMissingThreeAre) {
+  Watching w(2);
+  for (int i = 0; i < 12; ++i) w.frame({.missing = i % 3 < 2 ? 0.2 : 0.01}, matched(1400, 1500));
+  EXPECT_EQ(w.told(), "");
+}
+
 // Shrubs make a sound scan look false now and then; half a second of false returns is five scans.
 TEST(LidarWatch, TwoOddScansAreNotFalseThreeAre) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -238,6 +271,15 @@ TEST(LidarWatch, SurveyCountsWhatIsMissingAndWhatIsElsewhere) {
 TEST(LidarWatch, WaitsForTheFirstScan) {
   LidarWatch watch{LidarWatchConfig{}};
   EXPECT_FALSE(watch.update(10 * kNanosecondsPerSecond));
+  EXPECT_EQ(watch.silent_s(10 * kNanosecondsPerSecond), 0);
+}
+
+TEST(LidarWatch, TellsOneThatHasBeenDeadFromTheStart) {
+  LidarWatch watch{LidarWatchConfig{}};
+  watch.expect(3 * kNanosecondsPerSecond);
+  EXPECT_FALSE(watch.update(3 * kNanosecondsPerSecond));
+  EXPECT_EQ(watch.update(4 * kNanosecondsPerSecond), "lidar silent");
+  EXPECT_EQ(watch.silent_s(4 * kNanosecondsPerSecond), 1);
 }
 
 }  // namespace

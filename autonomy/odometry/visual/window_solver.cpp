@@ -177,8 +177,10 @@ void add_landmark(const Window& window, const WindowExposures& exposures, Landma
   const int camera = layout.camera();
   NormalEquations::LandmarkTerm term;
   term.landmark = &landmark;
-  Eigen::Matrix<double, Eigen::Dynamic, kLandmarkDim> W =
-      Eigen::MatrixXd::Zero(layout.visual_size(), kLandmarkDim);
+  const Eigen::Index column = kLandmarkDim * static_cast<Eigen::Index>(out.terms.size());
+  if (out.W.cols() <= column) out.W.conservativeResize(Eigen::NoChange, 2 * column + 96);
+  auto W = out.W.middleCols<kLandmarkDim>(column);
+  W.setZero();
   const auto visit = [&](const Sight& sight, std::size_t a, std::size_t s) {
     const auto residual =
         sight_residual(sight, exposures.now[a], exposures.now[s], window.camera, landmark.state);
@@ -208,21 +210,21 @@ void add_landmark(const Window& window, const WindowExposures& exposures, Landma
     out.g.segment<kPoseDim>(pa).noalias() += J.anchor.transpose() * r;
     out.g.segment<kPoseDim>(ps).noalias() += J.seen.transpose() * r;
     out.g.segment<kCameraDim>(camera).noalias() += J.camera.transpose() * r;
-    W.middleRows<kPoseDim>(pa).noalias() += J.anchor.transpose() * J.landmark;
-    W.middleRows<kPoseDim>(ps).noalias() += J.seen.transpose() * J.landmark;
-    W.middleRows<kCameraDim>(camera).noalias() += J.camera.transpose() * J.landmark;
+    W.template middleRows<kPoseDim>(pa).noalias() += J.anchor.transpose() * J.landmark;
+    W.template middleRows<kPoseDim>(ps).noalias() += J.seen.transpose() * J.landmark;
+    W.template middleRows<kCameraDim>(camera).noalias() += J.camera.transpose() * J.landmark;
   };
   for_each_sight(window, landmark, noise, count, visit);
   // Without a depth its ray says nothing of the frames.
   if (term.H(2, 2) <= 0) return;
-  const Eigen::Index column = kLandmarkDim * static_cast<Eigen::Index>(out.terms.size());
-  if (out.W.cols() <= column) out.W.conservativeResize(Eigen::NoChange, 2 * column + 96);
-  out.W.middleCols<kLandmarkDim>(column) = W;
   out.terms.push_back(term);
 }
 
 NormalEquations linearise(Window& window, const WindowNoise& noise) {
   NormalEquations out = empty_equations(window);
+  // At once, for each has some hundred kilobytes.
+  out.terms.reserve(window.landmarks.size());
+  out.W.resize(Eigen::NoChange, kLandmarkDim * static_cast<Eigen::Index>(window.landmarks.size()));
   add_rows(prior_rows(window), out);
   for (int to = 1; to < window.layout().frames; ++to) add_imu(window, to, noise, out);
   const WindowExposures exposures(window, noise);
@@ -258,9 +260,10 @@ ReducedEquations reduce(const NormalEquations& equations, double lambda) {
 }
 
 WindowStep solve(const NormalEquations& equations, double lambda) {
-  const ReducedEquations reduced = reduce(equations, lambda);
+  ReducedEquations reduced = reduce(equations, lambda);
   WindowStep step;
-  step.states = -reduced.H.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(reduced.H);  // in its place
+  step.states = -factor.solve(reduced.g);
   const Eigen::Index columns = kLandmarkDim * static_cast<Eigen::Index>(equations.terms.size());
   step.landmarks = equations.W.leftCols(columns).transpose() * step.states.head(equations.W.rows());
   Eigen::Index column = 0;
@@ -302,8 +305,8 @@ SolveReport optimise(Window& window, const WindowNoise& noise, int iterations, d
   report.cost_after = equations.cost;
 
   const WindowLayout layout = window.layout();
-  const Eigen::MatrixXd H = reduce(equations, 0).H;
-  const auto factor = H.selfadjointView<Eigen::Lower>().llt();
+  Eigen::MatrixXd H = reduce(equations, 0).H;
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(H);
   Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(layout.size(), kFrameDim + kCameraDim);
   const int last = layout.frames - 1;
   for (int i = 0; i < kFrameDim; ++i) wanted(layout.at(last, i), i) = 1;

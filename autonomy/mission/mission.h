@@ -177,7 +177,7 @@ class Mission {
     bool leg_blocked = false;                             ///< something stands in the way of a kLeg
     LandingGround below = LandingGround::kUnknown;        ///< where it would come down
     bool at_reserve = false;     ///< of the battery: what is left is needed to land
-    std::string_view trouble;    ///< the newest fault of sensors or vehicle that is not over
+    std::string_view trouble;    ///< the first fault of sensors or vehicle that is not over
     double blind_s = 0;          ///< since the LiDAR's newest scan
     bool lives_on_scans = true;  ///< the odometry that flies: without any it will be lost
   };

@@ -18,26 +18,6 @@ bool is_same(const LidarScan& a, const LidarScan& b) {
          a.points.front().p_L == b.points.front().p_L && a.points.back().p_L == b.points.back().p_L;
 }
 
-/// Whether an event says that a fault has ended.
-bool is_over(std::string_view detail) {
-  return detail.ends_with("again") || detail.ends_with("any more") || detail.ends_with("over");
-}
-
-/// The first trouble that is not over: what came after it is more likely its consequence. The
-/// battery's current swings with the motors, though, and shows first what ails them or the frame.
-std::string trouble_after(std::string trouble, EventKind kind, const std::string& detail) {
-  std::string name;
-  if (kind == EventKind::kVibration) name = "vibration";
-  if (kind == EventKind::kSensorFault || kind == EventKind::kVehicleFault) {
-    name = detail.substr(0, detail.find(':'));
-  }
-  if (name.empty()) return trouble;
-  const bool symptom = trouble == "power noisy" && kind != EventKind::kSensorFault;
-  if (!is_over(detail)) return trouble.empty() || symptom ? name : trouble;
-  const std::string whose = name.substr(0, name.find(' '));
-  return trouble.starts_with(whose) ? std::string() : trouble;
-}
-
 /// What a scenario says under `modules` of a module.
 ConfigNode own_parameters(const StackConfig& config, const std::string& name) {
   const auto section = config.modules.find(name);
@@ -274,7 +254,7 @@ std::optional<AttitudeCommand> Stack::tick() {
   request_ = mission_.update(
       {now_, checked_odometry(), odometry_need(), autopilot_.ready, autopilot_.armed,
        serves ? navigator_.progress() : MotionProgress::kUnderWay, navigator_.cause(),
-       !navigating_ && legs_.blocked(), ground_below(), at_reserve(), trouble_,
+       !navigating_ && legs_.blocked(), ground_below(), at_reserve(), faults_.first(),
        lidar_watch_.silent_s(now_), flying().odometry->places_scans()});
   setpoint_ = move(request_);
   return control(request_);
@@ -414,7 +394,7 @@ AttitudeCommand Stack::control(const MotionRequest& request) {
 }
 
 void Stack::report(EventKind kind, const std::string& detail) {
-  trouble_ = trouble_after(std::move(trouble_), kind, detail);
+  faults_.add(kind, detail);
   events_.push_back({now_, kind, detail});
 }
 

@@ -19,6 +19,7 @@
 #include "stack/odometry_switch.h"
 #include "stack/perception.h"
 #include "stack/stack_config.h"
+#include "stack/standing_faults.h"
 
 namespace arex {
 
@@ -108,7 +109,7 @@ class Stack : public FlightSoftware {
   LidarWatch lidar_watch_;
   LidarScanPtr last_scan_;  ///< of the first LiDAR
   HealthWatch health_watch_;
-  std::string trouble_;  ///< the first fault that has not been said to be over
+  StandingFaults faults_;  ///< those told so far
   Odometry odometry_;
   AutopilotStatus autopilot_;
   ConsumptionModel energy_;

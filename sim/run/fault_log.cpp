@@ -10,11 +10,14 @@ bool names_a_fault(const Event& event) {
          event.kind == EventKind::kVibration;
 }
 
+bool is_weak_odometry(const Event& event) {
+  return event.kind == EventKind::kOdometryStatus &&
+         (event.detail == "degenerate" || event.detail == "lost");
+}
+
 /// That something is wrong, if not what.
 bool is_typed(const Event& event) {
-  const bool weak = event.kind == EventKind::kOdometryStatus &&
-                    (event.detail == "degenerate" || event.detail == "lost");
-  return names_a_fault(event) || weak || event.kind == EventKind::kStuck;
+  return names_a_fault(event) || is_weak_odometry(event) || event.kind == EventKind::kStuck;
 }
 
 }  // namespace
@@ -28,9 +31,18 @@ FaultLog::FaultLog(const std::vector<FaultConfig>& faults) {
 
 void FaultLog::add(const Event& event) {
   events_ += names_a_fault(event);
+  standing_.add(event.kind, event.detail);
+  if (event.kind == EventKind::kOdometryStatus) {
+    odometry_ = is_weak_odometry(event) ? "odometry " + event.detail : "";
+  }
   if (!begin_ || event.stamp < *begin_ || !told_.empty() || !is_typed(event)) return;
   told_ = std::string(kEventKindNames[static_cast<std::size_t>(event.kind)]) + ": " + event.detail;
   told_at_ = event.stamp;
+}
+
+std::string FaultLog::standing() const {
+  const std::string first(standing_.first());
+  return first.empty() ? odometry_ : first;
 }
 
 void FaultLog::add_figures(Figures& figures) const {

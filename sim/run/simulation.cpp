@@ -39,6 +39,15 @@ bool has_left(const worlds::Bounds& bounds, const Vec3& p_W) {
   return (p_W - nearest).norm() > kFarthest_m || p_W.z() < bounds.low.z() - kDeepest_m;
 }
 
+/// A reason with the fault that had been told and still stood, unless it tells of it itself. What
+/// was asked to end, or went well, was ended by no fault.
+std::string reason_after(Outcome outcome, const std::string& reason, const std::string& fault) {
+  const bool failed = outcome != Outcome::kSucceeded && outcome != Outcome::kInterrupted;
+  const bool of_odometry = fault.starts_with("odometry ");
+  const bool says_so = reason.find(of_odometry ? "odometry" : fault) != std::string::npos;
+  return !failed || fault.empty() || says_so ? reason : reason + std::string(kAfter) + fault;
+}
+
 /// What the omniscient tour has in common with the mission.
 TourMission tour_mission_of(const StackConfig& stack) {
   const MissionConfig& mission = stack.mission;
@@ -327,10 +336,10 @@ void Simulation::interrupt(const std::string& reason) { end(Outcome::kInterrupte
 void Simulation::end(Outcome outcome, const std::string& reason) {
   if (outcome_ != Outcome::kFlying) return;
   outcome_ = outcome;
-  reason_ = reason;
+  reason_ = reason_after(outcome, reason, fault_log_.standing());
   if (recorder_) {
     const std::string name(kOutcomeNames[static_cast<std::size_t>(outcome)]);
-    recorder_->event({now_, EventKind::kFinished, name + ": " + reason});
+    recorder_->event({now_, EventKind::kFinished, name + ": " + reason_});
   }
 }
 

@@ -14,7 +14,11 @@ std::vector<FigureInfo> run_figures() {
   return {
       {"outcome", "outcome", "", kNeither, true,
        "succeeded, collided, stuck, lost, timed_out or interrupted", Kind::kText},
-      {"reason", "reason", "", kNeither, true, "why the run ended so", Kind::kText},
+      {"reason", "reason", "", kNeither, true,
+       "why the run ended so; of one that failed with the first fault that had been told and not "
+       "been "
+       "said to be over: hit trunk 40 at 2.47 m/s after motor 2 weak",
+       Kind::kText},
       {"scenario", "scenario", "", kNeither, false, "its name: --name, or the file's", Kind::kText},
       {"seed", "seed", "", kNeither, false, "of everything random"},
       {"sim_time_s", "flight time", "s", kLess, true,

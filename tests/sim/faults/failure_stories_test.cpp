@@ -81,6 +81,9 @@ TEST(FailureStories, AStoppedMotorFallsButIsTold) {
         fly(kBare, {"faults=[{device: esc, kind: stop, number: 3, from_s: 9}]"}, seed);
     EXPECT_EQ(flown.result.outcome, Outcome::kCollided) << "four rotors, and none to spare";
     EXPECT_LT(flown.events.find("vehicle_fault,"), flown.events.find("collision,")) << flown.events;
+    EXPECT_TRUE(flown.result.reason.starts_with("hit ground")) << flown.result.reason;
+    EXPECT_TRUE(flown.result.reason.ends_with(" after motor 3 stopped")) << flown.result.reason;
+    EXPECT_TRUE(flown.told("finished,collided: " + flown.result.reason)) << flown.events;
   }
 }
 

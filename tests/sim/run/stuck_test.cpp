@@ -50,7 +50,7 @@ TEST(Lost, WhereNothingIsTheFlightEnds) {
                        "control.observe_disturbance=false", "mission.max_time_s=300"},
                       1));
     EXPECT_EQ(result.outcome, Outcome::kLost) << result.reason;
-    EXPECT_EQ(result.reason, "left the world");
+    EXPECT_EQ(result.reason, "left the world after out of control");
     EXPECT_LT(to_seconds(result.duration), 120);
   }
 }

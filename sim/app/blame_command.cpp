@@ -196,8 +196,8 @@ int blame(const BlameArguments& arguments) {
     blame.flights.push_back(end_of(experiment.name, experiment.text,
                                    sim::read_summary(folder / experiment.name).value()));
   }
-  blame.verdict =
-      sim::judge(blame.flights, sim::sensors_are_as_sold(load_yaml(run / "resolved.yaml")));
+  blame.verdict = sim::judge(blame.failed, blame.flights,
+                             sim::sensors_are_as_sold(load_yaml(run / "resolved.yaml")));
   write_atomically(folder / kBlameReport, sim::blame_report_html(blame, folder));
   write_atomically(folder / kJson, sim::json_text(sim::blame_json(blame)));
   lock.remove();

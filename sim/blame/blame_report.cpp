@@ -16,13 +16,14 @@ namespace {
 
 constexpr std::size_t kCloudPoints = 100'000;  // of a map that stands in for a 2D map
 
-std::string row_html(const FlightEnd& flight, const std::string& name) {
+std::string row_html(const FlightEnd& flight, const std::string& name, std::string_view effect) {
   const char* mood = flight.succeeded() ? " class=\"better\"" : "";
   std::string html = "<tr>";
   for (const std::string& text : {name, flight.text}) {
     html += "<td class=\"text\">" + escape_markup(text) + "</td>";
   }
-  html += fmt::format("<td{}>", mood) + escape_markup(words(flight.outcome)) + "</td>";
+  html += fmt::format("<td{}>{}</td><td{}>", mood, words(std::string(effect)), mood) +
+          escape_markup(words(flight.outcome)) + "</td>";
   html += fmt::format("<td>{:.1f}</td>", flight.sim_time_s);
   return html + "<td class=\"text\">" + escape_markup(flight.reason) + "</td></tr>\n";
 }
@@ -30,14 +31,18 @@ std::string row_html(const FlightEnd& flight, const std::string& name) {
 std::string table_html(const Blame& blame) {
   std::string html =
       "<section>\n<h2>Flights</h2>\n<div class=\"scroll whole\"><table class=\"data\">\n<thead><tr>"
-      "<th class=\"text\">truth in</th><th class=\"text\">replaced by</th><th>outcome</th>"
+      "<th class=\"text\">truth in</th><th class=\"text\">replaced by</th><th>failure</th>"
+      "<th>outcome</th>"
       "<th>time, s</th><th class=\"text\">why</th></tr></thead>\n<tbody>\n";
-  html += row_html(blame.failed, "as flown");
-  for (const FlightEnd& flight : blame.flights) html += row_html(flight, words(flight.name));
+  html += row_html(blame.failed, "as flown", "");
+  for (const FlightEnd& flight : blame.flights) {
+    html += row_html(flight, words(flight.name), effect_text(blame, flight));
+  }
   return html +
          "</tbody>\n</table></div>\n<p class=\"note\">Each flight has the same world and the same "
          "seed. Where truth in several single places ends the failure, it is laid to the first "
-         "along the flow of data: sensors, odometry, maps, tracking. Its folder, beside this "
+         "along the flow of data: sensors, odometry, maps, tracking. Gone: the flight fails "
+         "otherwise, later; cut short: earlier, which proves nothing. Its folder, beside this "
          "page, is a run like any other.</p>\n</section>\n";
 }
 

@@ -78,6 +78,19 @@ TEST(Blame, LaysAJumpOfTheOriginToTheOdometry) {
   EXPECT_EQ(failure.outcome_with("tracking"), failure.json()["failed"]["outcome"]);
 }
 
+// Home is not reached in this time anyway: that is no reason to say that nothing ends the
+// collision.
+TEST(Blame, TellsThatTheCollisionIsGoneAndWhatComesThen) {
+  const Failure failure(blind(
+      {"mocap.fault_jump_from_s=9", "mocap.fault_jump_m=[0, 5, 0]", "mission.max_time_s=25"}));
+  EXPECT_EQ(failure.json()["failed"]["outcome"], "collided");
+  EXPECT_EQ(failure.outcome_with("odometry"), "timed_out");
+  EXPECT_TRUE(failure.verdict().starts_with("odometry: the collision disappears"))
+      << failure.blame().out;
+  EXPECT_EQ(failure.json()["verdict"]["kind"], "module");
+  EXPECT_EQ(failure.json()["verdict"]["then"]["outcome"], "timed_out");
+}
+
 TEST(Blame, LaysALegThroughTreesToThePlanning) {
   const Failure failure(blind({"mission.waypoints_m=[[12, 9, 1.5], [-12, -9, 1.5]]"}));
   EXPECT_EQ(failure.json()["failed"]["outcome"], "collided");

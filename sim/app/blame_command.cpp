@@ -8,6 +8,7 @@
 #include <list>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include "app/commands.h"
@@ -18,9 +19,11 @@
 #include "config/config.h"
 #include "config/text.h"
 #include "files/files.h"
+#include "report/result_table.h"
 #include "report/run_record.h"
 #include "run/file_io.h"
 #include "run/foreign_json.h"
+#include "run/simulation.h"
 #include "run/summary.h"
 #include "sweep/child_process.h"
 
@@ -37,31 +40,63 @@ constexpr double kLongestWait_s = 0.5;  // between two looks at the flights
 
 sim::FlightEnd end_of(const std::string& name, const std::string& text,
                       const ordered_json& summary) {
-  const auto time = summary.find("sim_time_s");
   return {name,
           text,
           sim::text_field(summary, "outcome"),
           sim::text_field(summary, "reason"),
-          time != summary.end() && time->is_number() ? time->get<double>() : 0,
+          summary.at("sim_time_s").get<double>(),
           sim::text_field(summary, "trajectory_hash")};
+}
+
+/// @throws ConfigError for the first field that a blame needs and a summary lacks.
+void expect_fields(const fs::path& file, const ordered_json& summary) {
+  const auto expect = [&](const char* key, const char* type, auto is_of_type) {
+    const auto field = summary.find(key);
+    if (field != summary.end() && is_of_type(*field)) return;
+    throw ConfigError(file.string() + (field == summary.end() ? ": lacks '" : ": has an odd '") +
+                      key + "', expected " + type + ", as a run's summary has");
+  };
+  for (const char* key : {"outcome", "reason", "scenario"}) {
+    expect(key, "a text", [](const ordered_json& field) { return field.is_string(); });
+  }
+  expect("seed", "an integer",
+         [](const ordered_json& field) { return field.is_number_unsigned(); });
+  expect("sim_time_s", "a number", [](const ordered_json& field) { return field.is_number(); });
+}
+
+/// @throws ConfigError for a folder that is none of a run.
+void expect_run_folder(const fs::path& run) {
+  std::error_code none;
+  if (sim::is_sweep_folder(run)) {
+    throw ConfigError(run.string() + ": is the folder of a sweep, expected one of its runs");
+  }
+  if (sim::is_run_folder(run)) return;
+  throw ConfigError(run.string() + (fs::exists(run, none) ? ": holds no run" : ": does not exist") +
+                    ", expected a run folder");
 }
 
 /// The summary of a run that can be blamed for something. @throws ConfigError
 ordered_json summary_of(const fs::path& run) {
   std::error_code none;
-  if (!sim::is_run_folder(run)) {
-    throw ConfigError(run.string() +
-                      (fs::exists(run, none) ? ": holds no run" : ": does not exist") +
-                      ", expected a run folder");
+  expect_run_folder(run);
+  const fs::path file = run / "summary.json";
+  if (!fs::exists(file, none)) {
+    throw ConfigError(run.string() + ": is unfinished, expected a run with a summary");
   }
   const auto summary = sim::read_summary(run);
-  if (!summary) throw ConfigError(run.string() + ": is unfinished, expected a run with a summary");
+  if (!summary) throw ConfigError(file.string() + ": is no JSON object, expected a run's summary");
   if (summary->contains("replay")) {
     throw ConfigError(run.string() + ": is a replay, expected a flight");
   }
+  expect_fields(file, *summary);
   const std::string outcome = sim::text_field(*summary, "outcome");
-  if (outcome.empty() || outcome == "interrupted") {
+  if (outcome == "interrupted") {
     throw ConfigError(run.string() + ": was interrupted, expected a flight that came to its end");
+  }
+  const auto ends = std::span(sim::kOutcomeNames).subspan(1);  // "flying" is none
+  if (std::find(ends.begin(), ends.end(), outcome) == ends.end()) {
+    throw ConfigError(file.string() + ": has the outcome '" + shortened(outcome) +
+                      "', expected succeeded, collided, stuck, lost or timed_out");
   }
   return *summary;
 }
@@ -173,8 +208,7 @@ int blame(const BlameArguments& arguments) {
   const fs::path run = fs::canonical(given, none);
   blame.run = run.string();
   blame.scenario = sim::text_field(summary, "scenario", "run");
-  const auto seed = summary.find("seed");
-  if (seed != summary.end() && seed->is_number_unsigned()) blame.seed = seed->get<std::uint64_t>();
+  blame.seed = summary.at("seed").get<std::uint64_t>();
   const std::vector<sim::Experiment> experiments =
       sim::plan_experiments(blame.scenario, load_yaml(run / "resolved.yaml"),
                             blame.failed.outcome == "timed_out", !flown_by_this_build(summary));

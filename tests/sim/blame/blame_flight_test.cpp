@@ -138,6 +138,34 @@ TEST(Blame, RefusesWhatCannotBeBlamedWithOneLine) {
   interrupted.replace(interrupted.find("timed_out"), 9, "interrupted");
   test::write_text(run / "summary.json", interrupted);
   expect_refused({"blame", run.string()}, "was interrupted");
+  const std::string file = (run / "summary.json").string();
+  for (const auto& [text, why] : std::vector<std::pair<std::string, std::string>>{
+           {"{}", ": lacks 'outcome', expected a text"},
+           {"[]", ": is no JSON object"},
+           {"{\"outcome\": ", ": is no JSON object"},
+           {R"({"outcome": 7})", ": has an odd 'outcome', expected a text"},
+           {R"({"outcome": "collided", "reason": "hit"})", ": lacks 'scenario'"},
+           {R"({"outcome": "collided", "reason": "hit", "scenario": "s", "seed": 1})",
+            ": lacks 'sim_time_s', expected a number"},
+           {R"({"outcome": "burnt", "reason": "", "scenario": "s", "seed": 1, "sim_time_s": 1})",
+            ": has the outcome 'burnt', expected succeeded, collided"},
+           {R"({"outcome": "lost", "reason": "", "scenario": "s", "seed": -1, "sim_time_s": 1})",
+            ": has an odd 'seed', expected an integer"}}) {
+    test::write_text(file, text);
+    expect_refused({"blame", run.string()}, file + why);
+  }
+  test::write_text(file, R"({"replay": {}})");
+  expect_refused({"blame", run.string()}, "is a replay");
+  test::write_text(file, summary);
+  const std::string resolved = read_text(run / "resolved.yaml");
+  std::filesystem::remove(run / "resolved.yaml");
+  expect_refused({"blame", run.string()}, (run / "resolved.yaml").string() + ":1: ");
+  test::write_text(run / "resolved.yaml", resolved + "of_another_version: 1\n");
+  expect_refused({"blame", run.string()}, "unknown key 'of_another_version'");
+  test::write_text(run / "resolved.yaml", resolved);
+  std::filesystem::create_directory(folder / "sweep");
+  test::write_text(folder / "sweep/sweep.json", "{}");
+  expect_refused({"blame", (folder / "sweep").string()}, "is the folder of a sweep");
   EXPECT_FALSE(std::filesystem::exists(folder / "run-blame"));
   std::string succeeded = summary;
   succeeded.replace(succeeded.find("timed_out"), 9, "succeeded");

@@ -3,6 +3,8 @@
 
 #include "app/commands.h"
 #include "app/host.h"
+#include "config/text.h"
+#include "run/idle_faults.h"
 #include "run/scenario.h"
 
 namespace arex::app {
@@ -35,6 +37,9 @@ int validate(const ScenarioArguments& arguments) {
   const worlds::World world = scenario.build_world();
   std::printf("%s: valid; %zu objects, %zu triangles\n", arguments.file.c_str(),
               world.objects.size(), world.mesh.triangles.size());
+  for (const std::string& line : sim::idle_faults(scenario.config)) {
+    std::fprintf(stderr, "arex: %s\n", printable(line).c_str());
+  }
   return 0;
 }
 

@@ -19,6 +19,7 @@
 #include "config/text.h"
 #include "files/files.h"
 #include "report/run_report.h"
+#include "run/idle_faults.h"
 #include "run/recorder.h"
 #include "run/requirement.h"
 #include "run/run_folder.h"
@@ -259,6 +260,9 @@ int run(const RunArguments& arguments) {
   sim::Simulation simulation(
       scenario, arguments.threads > 0 ? arguments.threads : std::min(cores(), kMostThreads));
   outputs.begin(arguments, scenario, folder->path(), simulation);
+  for (const std::string& line : sim::idle_faults(scenario.config)) {
+    std::fprintf(stderr, "arex: %s\n", printable(line).c_str());
+  }
   fly(simulation, outputs, arguments.quiet);
   const sim::FlightResult result = simulation.finish();
   const nlohmann::ordered_json summary =

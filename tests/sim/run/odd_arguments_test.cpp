@@ -1,0 +1,50 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/process.h"
+
+// What a command line gives that cannot be meant, or has no effect.
+namespace arex {
+namespace {
+
+using Result = test::ProcessResult;
+using test::TemporaryFolder;
+using test::write_text;
+
+constexpr const char* kWaypointsFile = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
+
+Result run_arex(const std::vector<std::string>& arguments) {
+  return test::run_process(AREX_BINARY, arguments);
+}
+
+// A sweep or a blame takes devices away: what was to befall them is told, and
+// flown without.
+TEST(OddArguments, SaysWhichFaultsCanHaveNoEffect) {
+  const TemporaryFolder folder;
+  write_text(folder / "s.yaml",
+             "world: {kind: empty, empty: {size_m: [20, 20]}}\nlidar: {enabled: "
+             "false}\n"
+             "mapping: {enabled: false, use_depth: false}\nodometry: {source: mocap}\n"
+             "faults: [{device: imu, kind: delayed}, {device: lidar, kind: silent}]\n"
+             "mission: {kind: waypoints, waypoints_m: [[1, 0, 1]], max_time_s: "
+             "0.2}\n");
+  const std::string file = (folder / "s.yaml").string();
+  const std::string line =
+      "arex: faults: item 2, lidar silent from 0 s, has "
+      "no effect: lidar.enabled is false\n";
+  const Result flown =
+      run_arex({"run", file, "--quiet", "--no-report", "--out", (folder / "run").string()});
+  EXPECT_EQ(flown.exit_code, 1);  // timed out
+  EXPECT_EQ(flown.err.substr(0, line.size()), line);
+  EXPECT_EQ(std::count(flown.err.begin(), flown.err.end(), '\n'), 2) << flown.err;
+  const Result valid = run_arex({"validate", file});
+  EXPECT_EQ(valid.exit_code, 0);
+  EXPECT_EQ(valid.err, line);
+}
+
+}  // namespace
+}  // namespace arex

@@ -281,6 +281,13 @@ std::vector<std::string> alternatives(const CLI::App& command, const std::string
   return names;
 }
 
+// A shell leaves an empty word where a variable is not set: no file has that name, and what is
+// written by default is not what was asked for.
+[[noreturn]] void refuse_empty(const std::string& command, const std::string& option) {
+  throw ConfigError("arex " + command + ": " + (option.empty() ? "an argument" : option) +
+                    " is empty, expected a value; see arex " + command + " --help");
+}
+
 // CLI11 only says that a word was not expected; the nearest one is what the user looks for. And it
 // takes the next option for the value of one that was left without: `--bag --quiet` wrote a bag of
 // that name.
@@ -297,11 +304,14 @@ void expect_known_words(const CLI::App& app, const std::vector<std::string>& wor
                       nearest(words[0], names) + "'? See arex --help");
   }
   const CLI::Option* waiting = nullptr;  // for its value, the next word
+  bool names_only = false;               // from "--" on
   for (const std::string& word : words) {
-    if (word == "--") return;
     const CLI::Option* option_before = std::exchange(waiting, nullptr);
-    if (!word.starts_with("--")) continue;
+    if (word.empty()) refuse_empty(words[0], option_before ? option_before->get_name() : "");
+    names_only = names_only || word == "--";
+    if (names_only || !word.starts_with("--")) continue;
     const std::string option = word.substr(0, word.find('='));
+    if (option + "=" == word) refuse_empty(words[0], option);
     const std::vector<std::string> known = alternatives(*command, option);
     if (known.empty() && option_before != nullptr) {
       throw ConfigError("arex " + words[0] + ": " + option_before->get_name() +

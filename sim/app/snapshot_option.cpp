@@ -12,13 +12,15 @@ std::vector<Stamp> snapshot_times(const std::vector<std::string>& texts, double 
                                   const std::string& end) {
   std::vector<Stamp> times;
   for (const std::string& text : texts) {
-    const auto time_s = parse_double(text);
-    if (!time_s || !(*time_s > 0 && *time_s <= end_s)) {
+    const double time_s = parse_double(text).value_or(0);
+    const Stamp time = from_seconds(time_s);
+    const bool between_ticks = time % kNanosecondsPerTick != 0;
+    if (!(time_s > 0 && time_s < end_s) || time == 0 || between_ticks) {
       throw ConfigError("--snapshot: is '" + shortened(text) +
-                        "', expected seconds above 0 and up to " + end + ", " +
-                        config_detail::format_scalar(end_s));
+                        "', expected seconds above 0 and below " + end + ", " +
+                        config_detail::format_scalar(end_s) + ", in whole milliseconds");
     }
-    times.push_back(from_seconds(*time_s));
+    times.push_back(time);
   }
   return times;
 }

@@ -8,7 +8,8 @@
 /// The option --snapshot.
 namespace arex::app {
 
-/// Its times. @throws ConfigError for one that is not above 0 and at most `end_s`.
+/// Its times. @throws ConfigError for one that is not above 0 and below `end_s`, where nothing is
+/// seen any more, or between two ticks of the clock.
 /// @param end what ends then, in words
 std::vector<Stamp> snapshot_times(const std::vector<std::string>& texts, double end_s,
                                   const std::string& end);

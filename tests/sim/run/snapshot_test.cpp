@@ -173,7 +173,8 @@ TEST_F(Snapshots, UnfinishedAndDamagedOnesAreRefusedByName) {
 
 TEST(Snapshot, TimesThatAMissionCannotHaveAreRefusedBeforeTheFlight) {
   const TemporaryFolder folder;
-  for (const char* time : {"0", "-1", "9.5", "x", "nan"}) {
+  for (const char* time :
+       {"0", "-1", "9.5", "x", "nan", "inf", "1e400", "9", "1e-12", "0.0004", "1.0005"}) {
     const auto result = fly(folder / "run", {"--snapshot", time});
     EXPECT_EQ(result.exit_code, 2) << time;
     EXPECT_NE(result.err.find("--snapshot: is '"), std::string::npos) << result.err;

@@ -35,6 +35,7 @@ void FaultLog::add(const Event& event) {
   if (event.kind == EventKind::kOdometryStatus) {
     odometry_ = is_weak_odometry(event) ? "odometry " + event.detail : "";
   }
+  if (event.kind == EventKind::kStuck) when_stuck_ = standing_.first();
   if (!begin_ || event.stamp < *begin_ || !told_.empty() || !is_typed(event)) return;
   told_ = std::string(kEventKindNames[static_cast<std::size_t>(event.kind)]) + ": " + event.detail;
   told_at_ = event.stamp;

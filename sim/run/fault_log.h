@@ -26,6 +26,9 @@ class FaultLog {
   /// The first fault that was told and stands, or else what the odometry says of itself while it is
   /// degenerate or lost; empty: all is well, as far as was told.
   [[nodiscard]] std::string standing() const;
+  /// The first fault that stood when the mission last said that it is stuck: what a vehicle suffers
+  /// on its way down is no cause of that, and what its odometry lacks the mission tells itself.
+  [[nodiscard]] const std::string& standing_when_stuck() const { return when_stuck_; }
 
   /// Sets the figures `faults.*`.
   void add_figures(Figures& figures) const;
@@ -37,6 +40,7 @@ class FaultLog {
   Stamp told_at_ = 0;
   StandingFaults standing_;
   std::string odometry_;  ///< its newest status, if that is no good one
+  std::string when_stuck_;
 };
 
 }  // namespace arex::sim

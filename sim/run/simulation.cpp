@@ -336,7 +336,9 @@ void Simulation::interrupt(const std::string& reason) { end(Outcome::kInterrupte
 void Simulation::end(Outcome outcome, const std::string& reason) {
   if (outcome_ != Outcome::kFlying) return;
   outcome_ = outcome;
-  reason_ = reason_after(outcome, reason, fault_log_.standing());
+  const bool stuck = outcome == Outcome::kStuck;
+  reason_ = reason_after(outcome, reason,
+                         stuck ? fault_log_.standing_when_stuck() : fault_log_.standing());
   if (recorder_) {
     const std::string name(kOutcomeNames[static_cast<std::size_t>(outcome)]);
     recorder_->event({now_, EventKind::kFinished, name + ": " + reason_});

@@ -30,5 +30,20 @@ TEST(FaultLog, WhatStandsIsTheFirstFaultOrTheOdometrysOwnWord) {
             "");
 }
 
+// It was the shaking that kept it from its height, whatever came on the way down.
+TEST(FaultLog, WhatStoodWhenItWasStuckIsKept) {
+  FaultLog log{{}};
+  EXPECT_EQ(log.standing_when_stuck(), "");
+  log.add({0, EventKind::kOdometryStatus, "degenerate"});
+  log.add({0, EventKind::kStuck, "not_ready: nothing_to_register"});
+  EXPECT_EQ(log.standing_when_stuck(), "");
+  log.add({0, EventKind::kVibration, "gyro 1.00 rad/s RMS at 60 Hz"});
+  log.add({1, EventKind::kStuck, "takeoff: height not reached: vibration"});
+  log.add({2, EventKind::kVehicleFault, "out of control: leans by 64 degrees"});
+  log.add({3, EventKind::kVibration, "over"});
+  EXPECT_EQ(log.standing(), "out of control");
+  EXPECT_EQ(log.standing_when_stuck(), "vibration");
+}
+
 }  // namespace
 }  // namespace arex::sim

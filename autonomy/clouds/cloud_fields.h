@@ -61,6 +61,15 @@ inline double number(const char* bytes, NumberType type, bool swapped) {
 /// A number as text, `nan` and `inf` included; nothing if it is none.
 std::optional<double> parse_number(std::string_view word);
 
+/// A count of a header: digits alone. @param name what it counts, for the refusal
+/// @throws ConfigError if it is anything else, or more than `most`
+std::size_t parse_count(std::string_view word, const std::string& name, std::size_t most);
+
+/// What follows the last point that a header announces must be padding (blanks, zeros): points that
+/// it does not announce would be lost without a word.
+/// @throws ConfigError
+void expect_padding(std::string_view rest, std::size_t points);
+
 /// Splits off the next word of a line; empty at its end.
 std::string_view next_word(std::string_view& line);
 

@@ -12,6 +12,7 @@ namespace {
 using cloud_fields::next_line;
 using cloud_fields::next_word;
 using cloud_fields::NumberType;
+using cloud_fields::parse_count;
 using cloud_fields::parse_number;
 using cloud_fields::refuse;
 
@@ -25,16 +26,6 @@ std::vector<std::string_view> words_of(std::string_view line) {
     if (words.size() > kMostFields) refuse("has more than 4096 fields, expected a point cloud");
   }
   return words;
-}
-
-std::size_t parse_count(std::string_view word, const char* key, std::size_t most) {
-  const auto value = parse_number(word);
-  if (!value || !(*value >= 0) || *value > static_cast<double>(most) ||
-      *value != static_cast<double>(static_cast<std::size_t>(*value))) {
-    refuse(std::string(key) + " is " + shortened(std::string(word), 40) +
-           ", expected a whole number up to " + std::to_string(most));
-  }
-  return static_cast<std::size_t>(*value);
 }
 
 NumberType type_of(std::string_view type, std::size_t size) {
@@ -57,6 +48,24 @@ struct Lines {
   std::string_view width, height, points, data;
 };
 
+/// The words of a line whose key is there for the first time: of two the reader cannot know which
+/// is meant.
+void take_words(std::string_view line, const char* key, std::vector<std::string_view>& words) {
+  if (!words.empty()) refuse(std::string("has two lines ") + key + ", expected one");
+  words = words_of(line);
+}
+
+/// The one word of such a line.
+void take_word(std::string_view line, const char* key, std::string_view& word) {
+  std::vector<std::string_view> words;
+  if (!word.empty()) words.push_back(word);
+  take_words(line, key, words);
+  if (words.size() != 1) {
+    refuse(std::string(key) + " has " + std::to_string(words.size()) + " entries, expected one");
+  }
+  word = words.front();
+}
+
 Lines read_lines(std::string_view head, PcdHeader& header) {
   Lines lines;
   std::string_view rest = head;
@@ -65,15 +74,15 @@ Lines read_lines(std::string_view head, PcdHeader& header) {
     ++header.lines;
     if (line.starts_with('#')) continue;
     const std::string_view key = next_word(line);
-    if (key == "FIELDS" || key == "COLUMNS") lines.names = words_of(line);
-    if (key == "SIZE") lines.sizes = words_of(line);
-    if (key == "TYPE") lines.types = words_of(line);
-    if (key == "COUNT") lines.counts = words_of(line);
-    if (key == "WIDTH") lines.width = next_word(line);
-    if (key == "HEIGHT") lines.height = next_word(line);
-    if (key == "POINTS") lines.points = next_word(line);
+    if (key == "FIELDS" || key == "COLUMNS") take_words(line, "FIELDS", lines.names);
+    if (key == "SIZE") take_words(line, "SIZE", lines.sizes);
+    if (key == "TYPE") take_words(line, "TYPE", lines.types);
+    if (key == "COUNT") take_words(line, "COUNT", lines.counts);
+    if (key == "WIDTH") take_word(line, "WIDTH", lines.width);
+    if (key == "HEIGHT") take_word(line, "HEIGHT", lines.height);
+    if (key == "POINTS") take_word(line, "POINTS", lines.points);
     if (key != "DATA") continue;
-    lines.data = next_word(line);
+    take_word(line, "DATA", lines.data);
     header.begin = head.size() - rest.size();
     return lines;
   }
@@ -121,13 +130,13 @@ RawCloud gather(const PcdHeader& header, const Number& number) {
   return cloud;
 }
 
+std::size_t words_of_point(const PcdHeader& header) {
+  return header.fields.back().word + header.fields.back().count;
+}
+
 RawCloud read_ascii(const PcdHeader& header, std::string_view text) {
   RawCloud cloud;
-  std::size_t most = 0;
-  for (const int i : {header.x, header.y, header.z, header.intensity}) {
-    if (i >= 0) most = std::max(most, header.fields[static_cast<std::size_t>(i)].word);
-  }
-  std::vector<double> values(most + 1);
+  std::vector<double> values(header.points == 0 ? 0 : words_of_point(header));
   std::size_t number = header.lines;
   const auto at = [&](int field) {
     return values[header.fields[static_cast<std::size_t>(field)].word];
@@ -150,9 +159,14 @@ RawCloud read_ascii(const PcdHeader& header, std::string_view text) {
       }
       value = *parsed;
     }
+    if (!next_word(line).empty()) {
+      refuse("line " + std::to_string(number) + " has more than " + std::to_string(values.size()) +
+             " numbers, expected as many as FIELDS and COUNT announce");
+    }
     cloud.points.emplace_back(at(header.x), at(header.y), at(header.z));
     if (header.intensity >= 0) cloud.intensity.push_back(static_cast<float>(at(header.intensity)));
   }
+  cloud_fields::expect_padding(text, header.points);
   return cloud;
 }
 
@@ -201,6 +215,7 @@ RawCloud read_compressed(const PcdHeader& header, std::string_view bytes) {
   std::string out;
   if (!decompress_lzf(bytes.substr(0, packed), size, out))
     refuse("its compressed points are damaged");
+  cloud_fields::expect_padding(bytes.substr(packed), header.points);
   // Field by field.
   return gather(header, [&](std::size_t i, int f) {
     const PcdField& field = header.fields[static_cast<std::size_t>(f)];
@@ -237,6 +252,11 @@ PcdHeader parse_pcd_header(std::string_view head, std::uintmax_t size) {
       lines.height.empty() ? 1 : parse_count(lines.height, "HEIGHT", kMostPoints);
   header.points =
       lines.points.empty() ? width * height : parse_count(lines.points, "POINTS", kMostPoints);
+  // Beyond that the products with the points' sizes below would be too large for their type.
+  if (header.points > kMostPoints) {
+    refuse("WIDTH times HEIGHT is " + std::to_string(header.points) + ", expected at most " +
+           std::to_string(kMostPoints));
+  }
   if (!lines.width.empty() && width * height != header.points) {
     refuse("POINTS is " + std::to_string(header.points) + ", expected WIDTH times HEIGHT");
   }
@@ -244,7 +264,7 @@ PcdHeader parse_pcd_header(std::string_view head, std::uintmax_t size) {
   const std::uintmax_t rest = size - std::min<std::uintmax_t>(size, header.begin);
   const bool ascii = header.data == PcdHeader::Data::kAscii;
   const bool binary = header.data == PcdHeader::Data::kBinary;
-  const std::size_t fewest = ascii ? 2 * header.fields.size() - 1 : binary ? header.stride : 0;
+  const std::size_t fewest = ascii ? 2 * words_of_point(header) - 1 : binary ? header.stride : 0;
   if (fewest * header.points > rest ||
       (!ascii && !binary && header.points * header.stride > 264 * rest)) {
     refuse("has " + std::to_string(rest) + " bytes of points, expected " +
@@ -257,7 +277,9 @@ RawCloud read_pcd(const PcdHeader& header, std::string_view bytes) {
   bytes.remove_prefix(std::min(header.begin, bytes.size()));
   if (header.data == PcdHeader::Data::kAscii) return read_ascii(header, bytes);
   if (header.data == PcdHeader::Data::kCompressed) return read_compressed(header, bytes);
-  if (bytes.size() < header.points * header.stride) refuse("ends within its points");
+  const std::size_t all = header.points * header.stride;
+  if (bytes.size() < all) refuse("ends within its points");
+  cloud_fields::expect_padding(bytes.substr(all), header.points);
   return gather(header, [&](std::size_t i, int f) {
     const PcdField& field = header.fields[static_cast<std::size_t>(f)];
     return cloud_fields::number(bytes.data() + i * header.stride + field.offset, field.type, false);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <utility>
 
 #include "config/config.h"
@@ -14,12 +15,13 @@ namespace {
 using cloud_fields::next_line;
 using cloud_fields::next_word;
 using cloud_fields::NumberType;
+using cloud_fields::parse_count;
 using cloud_fields::parse_number;
 using cloud_fields::refuse;
 using cloud_fields::size_of;
 
 constexpr std::size_t kMostEntries = 4096;
-constexpr double kMostCount = 4e8;
+constexpr std::size_t kMostCount = 400'000'000;
 
 NumberType type_of(std::string_view word) {
   constexpr std::array<std::pair<std::string_view, NumberType>, 16> kNames{{
@@ -49,13 +51,12 @@ NumberType type_of(std::string_view word) {
 PlyElement parse_element(std::string_view line) {
   PlyElement element;
   element.name = std::string(next_word(line));
-  const std::string_view word = next_word(line);
-  const auto count = parse_number(word);
-  if (!count || !(*count >= 0) || *count > kMostCount) {
-    refuse("has " + shortened(std::string(word), 40) + " elements '" + shortened(element.name, 40) +
-           "', expected a number up to 4e8");
+  element.count =
+      parse_count(next_word(line), "element " + shortened(element.name, 40), kMostCount);
+  if (const std::string_view more = next_word(line); !more.empty()) {
+    refuse("element " + shortened(element.name, 40) + " has '" + shortened(std::string(more), 40) +
+           "' behind its number, expected a line's end");
   }
-  element.count = static_cast<std::size_t>(*count);
   return element;
 }
 
@@ -87,6 +88,7 @@ class BinarySource {
     bytes_.remove_prefix(bytes);
   }
   void skip(NumberType type, std::size_t count) { skip(size_of(type) * count); }
+  [[nodiscard]] std::string_view rest() const { return bytes_; }
 
  private:
   std::string_view bytes_;
@@ -115,6 +117,12 @@ class TextSource {
   void skip(NumberType type, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) next(type);
   }
+  /// What no line has been begun of; words left in the last line are one too many.
+  [[nodiscard]] std::string_view rest() const {
+    std::string_view line = line_;
+    const std::string_view word = next_word(line);
+    return word.empty() ? text_ : word;
+  }
 
  private:
   std::string_view text_, line_;
@@ -124,7 +132,9 @@ class TextSource {
 template <class Source>
 std::size_t list_length(Source& source, NumberType type) {
   const double length = source.next(type);
-  if (!(length >= 0) || length > kMostCount) refuse("has a list of no sensible length");
+  if (!(length >= 0) || length > static_cast<double>(kMostCount) || length != std::floor(length)) {
+    refuse("has a list of no sensible length");
+  }
   return static_cast<std::size_t>(length);
 }
 
@@ -161,7 +171,11 @@ RawCloud read_elements(const PlyHeader& header, Source& source) {
       if (intensity == none) continue;
       cloud.intensity.push_back(static_cast<float>(values[static_cast<std::size_t>(intensity)]));
     }
-    if (vertices) return cloud;  // what comes behind them is not asked for
+    if (!vertices) continue;
+    // Other elements behind them are not asked for.
+    if (&element == &header.elements.back())
+      cloud_fields::expect_padding(source.rest(), element.count);
+    return cloud;
   }
   return cloud;
 }
@@ -170,6 +184,10 @@ void expect_vertices(const PlyHeader& header) {
   const auto vertices = std::find_if(header.elements.begin(), header.elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });
   if (vertices == header.elements.end()) refuse("has no element vertex");
+  if (std::any_of(vertices + 1, header.elements.end(),
+                  [](const PlyElement& e) { return e.name == "vertex"; })) {
+    refuse("has two elements vertex, expected one");
+  }
   for (const char* name : {"x", "y", "z"}) {
     const bool there =
         std::any_of(vertices->properties.begin(), vertices->properties.end(),

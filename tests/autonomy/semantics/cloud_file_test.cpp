@@ -156,6 +156,105 @@ TEST(CloudFile, RefusesWhatIsNoCloudWithOneLine) {
             std::string::npos);
 }
 
+// What a header's number would have to be read as is anybody's guess, and points that it does not
+// announce would be lost without a word.
+TEST(CloudFile, RefusesHeadersThatLie) {
+  const std::vector<Vec3f> points = some_points(200);
+  const auto changed = [&](std::string bytes, const std::string& from, const std::string& to) {
+    EXPECT_NE(bytes.find(from), std::string::npos) << from;
+    return refusal(bytes.replace(bytes.find(from), from.size(), to));
+  };
+  const std::vector<std::string> wrong{"199.5", "200.0", "-200", "+200",
+                                       "2e2",   "0xC8",  "nan",  "99999999999999999999"};
+  const std::vector<std::string> files = all_encodings(points);
+  for (std::size_t kind = 0; kind < files.size(); ++kind) {
+    const std::string& bytes = files[kind];
+    const bool pcd = kind < 3;
+    for (const std::string& number : wrong) {
+      if (pcd) {
+        for (const std::string key : {"POINTS ", "WIDTH "}) {
+          EXPECT_NE(changed(bytes, key + "200\n", key + number + "\n").find("whole number"),
+                    std::string::npos)
+              << kind << key << number;
+        }
+        EXPECT_NE(changed(bytes, "COUNT 1", "COUNT " + number).find("whole number"),
+                  std::string::npos);
+        EXPECT_NE(changed(bytes, "SIZE 4", "SIZE " + number).find("whole number"),
+                  std::string::npos);
+        EXPECT_NE(changed(bytes, "HEIGHT 1", "HEIGHT " + number).find("whole number"),
+                  std::string::npos);
+      } else {
+        EXPECT_NE(changed(bytes, "vertex 200", "vertex " + number).find("whole number"),
+                  std::string::npos)
+            << kind << number;
+      }
+    }
+    if (pcd) {
+      EXPECT_NE(changed(bytes, "WIDTH 200", "WIDTH 200 7").find("WIDTH"), std::string::npos);
+      EXPECT_NE(changed(bytes, "HEIGHT 1", "HEIGHT 1\nHEIGHT 1").find("two lines HEIGHT"),
+                std::string::npos);
+    } else {
+      EXPECT_NE(changed(bytes, "vertex 200", "vertex 200 7").find("behind its number"),
+                std::string::npos);
+      EXPECT_NE(changed(bytes, "element face", "element vertex").find("two elements vertex"),
+                std::string::npos);
+    }
+  }
+}
+
+TEST(CloudFile, RefusesMorePointsThanAnnounced) {
+  const std::vector<Vec3f> points = some_points(200);
+  for (std::string bytes : {pcd_ascii(points), pcd_binary(points)}) {
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      bytes.replace(bytes.find(from), from.size(), to);
+    };
+    replace("WIDTH 200", "WIDTH 150");
+    replace("POINTS 200", "POINTS 150");
+    EXPECT_NE(refusal(bytes).find("goes on behind its 150 points"), std::string::npos);
+  }
+  EXPECT_NE(refusal(pcd_compressed(points) + "more").find("goes on"), std::string::npos);
+  EXPECT_NE(refusal(pcd_binary(points) + "\1").find("goes on"), std::string::npos);
+  // A column that FIELDS does not name.
+  std::string wide = pcd_ascii(points);
+  wide.insert(wide.find('\n', wide.find("DATA ascii\n") + 11), " 7");
+  EXPECT_NE(refusal(wide).find("line 12 has more than 4 numbers"), std::string::npos);
+  std::string text, binary;
+  for (const Vec3f& p : points) {
+    for (int k = 0; k < 3; ++k) {
+      text += std::to_string(p[k]) + " ";
+      append(binary, p[k]);
+    }
+    text += "\n";
+  }
+  const auto ply_of = [](const std::string& format, const std::string& count) {
+    return "ply\nformat " + format + " 1.0\nelement vertex " + count +
+           "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  };
+  for (const std::string count : {"150", "199"}) {
+    EXPECT_NE(refusal(ply_of("ascii", count) + text).find("goes on"), std::string::npos);
+    EXPECT_NE(refusal(ply_of("binary_little_endian", count) + binary).find("goes on"),
+              std::string::npos);
+  }
+  // Padding is none.
+  const std::string zeros(512, '\0');
+  for (const std::string& bytes :
+       {pcd_ascii(points) + " \r\n\n", pcd_binary(points) + zeros, pcd_compressed(points) + zeros,
+        ply_of("ascii", "200") + text + "\n",
+        ply_of("binary_little_endian", "200") + binary + "\n"}) {
+    EXPECT_EQ(read(bytes).points.size(), points.size());
+  }
+}
+
+// 2^56 points of 2^8 bytes: none, in 64 bits.
+TEST(CloudFile, RefusesAProductThatIsTooLargeForItsType) {
+  const std::string header =
+      "FIELDS x y z other\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 61\nWIDTH 268435456\nHEIGHT "
+      "268435456\nDATA ";
+  for (const std::string data : {"ascii\n", "binary\n", "binary_compressed\n"}) {
+    EXPECT_NE(refusal(header + data + "abcdefgh").find("WIDTH times HEIGHT"), std::string::npos);
+  }
+}
+
 TEST(CloudFile, BelievesNoHeaderThatPromisesMoreThanTheFile) {
   for (const std::string count : {"400000000", "4000000000", "18446744073709551615", "1e300"}) {
     const std::string xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " + count +

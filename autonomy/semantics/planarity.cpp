@@ -5,7 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
+
+#include "config/config.h"
 
 namespace arex {
 namespace {
@@ -170,6 +173,33 @@ Planarity planarity(const WorkingCloud& cloud) {
   found.roofed = roofed_fraction(cubes);
   if (upright > 0) found.fraction = static_cast<double>(plane) / static_cast<double>(upright);
   return found;
+}
+
+void expect_extent(std::span<const Vec3f> points) {
+  constexpr double kThin = 0.0015;  // m: a scanner's noise alone is more
+  Vec3 mean = Vec3::Zero();
+  std::size_t count = 0;
+  for (const Vec3f& p : points) {
+    if (!p.allFinite()) continue;
+    ++count;
+    mean += (p.cast<double>() - mean) / static_cast<double>(count);
+  }
+  if (count == 0) return;
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3f& p : points) {
+    if (!p.allFinite()) continue;
+    const Vec3 d = p.cast<double>() - mean;
+    spread += d * d.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(spread / static_cast<double>(count),
+                                                   Eigen::EigenvaluesOnly);
+  const Vec3 deviation = solver.eigenvalues().cwiseMax(0).cwiseSqrt();  // rising
+  if (!(deviation[0] < kThin)) return;
+  throw ConfigError(std::string("its points lie ") +
+                    (deviation[2] < kThin   ? "in one place"
+                     : deviation[1] < kThin ? "on one line"
+                                            : "in one plane") +
+                    ", expected a cloud of a place");
 }
 
 std::vector<bool> points_on_walls(const WorkingCloud& cloud) {

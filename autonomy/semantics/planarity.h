@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "semantics/working_cloud.h"
@@ -20,5 +21,9 @@ Planarity planarity(const WorkingCloud& cloud);
 
 /// Which points lie in a cube whose upright surface is plane and goes on beside it.
 std::vector<bool> points_on_walls(const WorkingCloud& cloud);
+
+/// @throws ConfigError if the points lie in one place, on one line or in one plane: nothing stands
+/// there, and no ground is that even.
+void expect_extent(std::span<const Vec3f> points);
 
 }  // namespace arex

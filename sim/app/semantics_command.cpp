@@ -19,6 +19,7 @@
 #include "scoring/semantic_score.h"
 #include "semantics/cloud_file.h"
 #include "semantics/pcl_models.h"
+#include "semantics/planarity.h"
 #include "semantics/semantic_picture.h"
 
 namespace arex::app {
@@ -148,6 +149,7 @@ void print_counts(const SemanticMap& map, const CloudFile& cloud, const fs::path
 SemanticMap map_of(const CloudFile& cloud, const std::vector<Vec3f>& path,
                    const SemanticConfig& config, const fs::path& file) {
   try {
+    expect_extent(cloud.points);
     SemanticMap map = build_semantic_map(cloud.points, path, config);
     if (map.points_used > 0) return map;
     throw ConfigError("its points lie kilometres from each other, expected a cloud of a place");

@@ -6,6 +6,7 @@
 #include "autonomy/semantics/analytic_clouds.h"
 #include "config/config.h"
 #include "semantics/ground_model.h"
+#include "semantics/planarity.h"
 #include "semantics/semantic_map.h"
 #include "semantics/working_cloud.h"
 
@@ -299,6 +300,35 @@ TEST(ForestMap, LivesWithNothingLittleAndFarEchoes) {
   const SemanticMap map = build_semantic_map(stand.cloud.points, {}, {});
   EXPECT_EQ(map.count(SemanticClass::kTrunk), 9u);
   EXPECT_EQ(map.labels.back(), SemanticClass::kUnlabelled);
+}
+
+TEST(ForestMap, ACloudWithoutExtentIsNoPlace) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    RandomStream random(seed, "no extent");
+    const Mat3 R = Quat(random.normal(), random.normal(), random.normal(), random.normal())
+                       .normalized()
+                       .toRotationMatrix();
+    const Vec3 origin = 500 * random.normal3();
+    const auto refusal = [&](const Vec3& half) {
+      std::vector<Vec3f> points;
+      for (int i = 0; i < 1000; ++i) {
+        Vec3 p(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+        points.push_back((origin + R * p.cwiseProduct(half)).cast<float>());
+      }
+      points.push_back(Vec3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+      try {
+        expect_extent(points);
+      } catch (const ConfigError& error) {
+        return std::string(error.what());
+      }
+      return std::string();
+    };
+    EXPECT_NE(refusal({0, 0, 0}).find("in one place"), std::string::npos);
+    EXPECT_NE(refusal({20, 0.0005, 0.0005}).find("on one line"), std::string::npos);
+    EXPECT_NE(refusal({20, 10, 0.0005}).find("in one plane"), std::string::npos);
+    EXPECT_EQ(refusal({20, 10, 0.01}), "");  // ground, and nothing on it
+    EXPECT_EQ(refusal({0.1, 5, 0.1}), "");
+  }
 }
 
 TEST(ForestMap, RefusesWhatIsTooWideForAMap) {

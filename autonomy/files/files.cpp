@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <utility>
 
 namespace arex {
@@ -60,6 +61,12 @@ fs::path target_of(const fs::path& file) {
   return link ? fs::canonical(file) : file;
 }
 
+void remove_if_there(const fs::path& file) {
+  if (unlink(file.c_str()) != 0 && errno != ENOENT) {
+    throw DiskError(file, "cannot be removed", last_error());
+  }
+}
+
 /// A file beside the one to be written, gone with the object unless it took the name.
 class Draft {
  public:
@@ -78,9 +85,13 @@ class Draft {
 
   void fill(std::string_view text, bool durable) {
     if (!write_all(descriptor_, text) || (durable && fsync(descriptor_) != 0)) refuse(target_);
-    if (!close_file() || rename(draft_.c_str(), target_.c_str()) != 0) refuse(target_);
+    if (!close_file()) refuse(target_);
+  }
+  void take_name() {
+    if (rename(draft_.c_str(), target_.c_str()) != 0) refuse(target_);
     draft_.clear();
   }
+  [[nodiscard]] const fs::path& target() const { return target_; }
 
  private:
   bool close_file() {
@@ -118,7 +129,21 @@ fs::path check_writable(const fs::path& file) {
 }
 
 void write_atomically(const fs::path& file, std::string_view text, bool durable) {
-  Draft(target_of(file)).fill(text, durable);
+  Draft draft(target_of(file));
+  draft.fill(text, durable);
+  draft.take_name();
+}
+
+void write_together(const std::vector<FileText>& files, const std::vector<fs::path>& outdated) {
+  std::vector<std::unique_ptr<Draft>> drafts;
+  for (const FileText& each : files) {
+    drafts.push_back(std::make_unique<Draft>(target_of(each.file)));
+    drafts.back()->fill(each.text, true);
+  }
+  if (drafts.empty()) return;
+  remove_if_there(drafts.back()->target());
+  for (const fs::path& file : outdated) remove_if_there(file);
+  for (const auto& draft : drafts) draft->take_name();
 }
 
 GrowingFile::GrowingFile(const fs::path& file) : file_(target_of(file)) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 /// The only way in which anything of the house reaches the disk: files that are whole or not there,
 /// and files that grow. Nothing but a regular file is ever replaced: no folder, device, FIFO or
@@ -37,6 +38,20 @@ std::filesystem::path check_writable(const std::filesystem::path& file);
 /// @throws DiskError; what stood there before is left alone then.
 void write_atomically(const std::filesystem::path& file, std::string_view text,
                       bool durable = true);
+
+/// One of several files that belong together.
+struct FileText {
+  std::filesystem::path file;
+  std::string text;
+};
+
+/// Writes files of which each tells of the others, durably. All are on the disk before the first
+/// takes its name, and what the last of them replaces goes before that: where it stands, all of its
+/// own making stand beside it, also after a kill.
+/// @param outdated files of an earlier set that this one has not; gone with it
+/// @throws DiskError; while files are written, what stood there before is left alone.
+void write_together(const std::vector<FileText>& files,
+                    const std::vector<std::filesystem::path>& outdated = {});
 
 /// A file that others may read while it grows, up to the last flush(). Every refusal of the disk is
 /// a DiskError with the reason of the very call that failed; the file is closed then.

@@ -12,7 +12,6 @@
 #include "clouds/pcd_reader.h"
 #include "clouds/ply_reader.h"
 #include "config/config.h"
-#include "files/files.h"
 
 namespace arex {
 
@@ -96,8 +95,7 @@ CloudFile read_cloud_file(const std::filesystem::path& file) {
   return cloud;
 }
 
-void write_semantic_pcd(const std::filesystem::path& file, const CloudFile& cloud,
-                        const SemanticMap& map) {
+std::string semantic_pcd(const CloudFile& cloud, const SemanticMap& map) {
   const bool wide = !cloud.origin.isZero();
   const bool bright = !cloud.intensity.empty();
   const std::string count = std::to_string(cloud.points.size());
@@ -129,7 +127,7 @@ void write_semantic_pcd(const std::filesystem::path& file, const CloudFile& clou
     if (bright) append(cloud.intensity[i]);
     append(static_cast<std::uint32_t>(map.labels[i]));
   }
-  write_atomically(file, bytes, false);
+  return bytes;
 }
 
 std::string objects_csv(const SemanticMap& map) {

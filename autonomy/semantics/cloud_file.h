@@ -26,11 +26,10 @@ CloudFile read_cloud_file(const std::filesystem::path& file);
 
 inline constexpr std::size_t kFewestPoints = 100;
 
-/// Writes the labelled cloud as a binary PCD: x, y, z (float; double if the origin is not zero),
-/// intensity (float, if there is any), label (uint32, the value of SemanticClass; the header's
-/// comments name them). Points keep their order. @throws DiskError
-void write_semantic_pcd(const std::filesystem::path& file, const CloudFile& cloud,
-                        const SemanticMap& map);
+/// The bytes of the labelled cloud as a binary PCD: x, y, z (float; double if the origin is not
+/// zero), intensity (float, if there is any), label (uint32, the value of SemanticClass; the
+/// header's comments name them). Points keep their order.
+std::string semantic_pcd(const CloudFile& cloud, const SemanticMap& map);
 
 /// The text of objects.csv: class,x_m,y_m,z_m,length_m,width_m,height_m,yaw_rad,base_z_m,
 /// canopy_diameter_m,seen_fraction,confidence; coordinates as in the cloud's file. Of a trunk,

@@ -158,6 +158,23 @@ SemanticMap map_of(const CloudFile& cloud, const std::vector<Vec3f>& path,
   }
 }
 
+/// objects.csv comes last: where it stands, all the rest is of the same map.
+void write_map(const fs::path& folder, const CloudFile& cloud, const SemanticMap& map,
+               const std::vector<Vec3f>& path, const std::optional<sim::SemanticScore>& score) {
+  std::vector<FileText> files{
+      {folder / "semantic.pcd", semantic_pcd(cloud, map)},
+      {folder / "semantic.png", png_bytes(draw_semantic_map(map, path))},
+  };
+  std::vector<fs::path> outdated;
+  if (score) {
+    files.push_back({folder / kScores, scores_csv(*score)});
+  } else {
+    outdated.push_back(folder / kScores);  // another map's
+  }
+  files.push_back({folder / "objects.csv", objects_csv(map)});
+  write_together(files, outdated);
+}
+
 }  // namespace
 
 int semantics(const SemanticsArguments& arguments) {
@@ -182,10 +199,7 @@ int semantics(const SemanticsArguments& arguments) {
   SemanticMap map = map_of(cloud, path, config, input.cloud);
   const auto score = scored ? score_of_run(arguments.input, map, cloud) : std::nullopt;
   map.origin = cloud.origin;
-  write_semantic_pcd(folder.path() / "semantic.pcd", cloud, map);
-  write_atomically(folder.path() / "objects.csv", objects_csv(map));
-  write_atomically(folder.path() / "semantic.png", png_bytes(draw_semantic_map(map, path)));
-  if (score) write_atomically(folder.path() / kScores, scores_csv(*score));
+  write_map(folder.path(), cloud, map, path, score);
   print_counts(map, cloud, folder.path());
   if (score) print_scores(*score);
   return 0;

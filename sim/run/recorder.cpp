@@ -235,7 +235,8 @@ void Recorder::write_maps(const Mapper& mapper) {
 void Recorder::write_semantics(const SemanticMap& map, const std::vector<Vec3f>& points_O,
                                const std::vector<Vec3f>& path_O) {
   attempt([&] {
-    write_semantic_pcd(directory_ / "semantic.pcd", {map.origin, points_O, {}}, map);
+    write_atomically(directory_ / "semantic.pcd", semantic_pcd({map.origin, points_O, {}}, map),
+                     false);
   });
   write_file("objects.csv", objects_csv(map));
   write_file("semantic.png", png_bytes(draw_semantic_map(map, path_O)));

@@ -126,7 +126,7 @@ TEST(CloudFile, KeepsAMapProjectionsCoordinates) {
   const TemporaryFolder folder;
   SemanticMap map;
   map.labels.assign(points.size(), SemanticClass::kTrunk);
-  write_semantic_pcd(folder / "semantic.pcd", cloud, map);
+  write(folder / "semantic.pcd", semantic_pcd(cloud, map));
   const CloudFile again = read_cloud_file(folder / "semantic.pcd");
   EXPECT_EQ(again.origin, cloud.origin);
   EXPECT_EQ(again.points, cloud.points);

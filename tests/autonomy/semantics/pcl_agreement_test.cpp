@@ -58,7 +58,7 @@ TEST(PclAgreement, PclReadsWhatWeWrite) {
     map.labels.push_back(static_cast<SemanticClass>(i % 13));
   }
   const TemporaryFolder folder;
-  write_semantic_pcd(folder / "semantic.pcd", cloud, map);
+  write_text(folder / "semantic.pcd", semantic_pcd(cloud, map));
   pcl::PointCloud<pcl::PointXYZL> labels;
   ASSERT_EQ(pcl::io::loadPCDFile((folder / "semantic.pcd").string(), labels), 0);
   pcl::PointCloud<pcl::PointXYZI> bright;

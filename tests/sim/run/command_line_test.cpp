@@ -328,6 +328,38 @@ TEST(CommandLine, RefusesACloudOfNoPlace) {
   EXPECT_FALSE(std::filesystem::exists(folder / "map/objects.csv"));
 }
 
+// Written again, the map of another cloud leaves nothing of the first; refused, all of it.
+TEST(CommandLine, ASemanticMapIsReplacedAsAWhole) {
+  const TemporaryFolder folder;
+  const auto write_cloud = [&](const std::string& name, double relief_m) {
+    std::string pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 900\nHEIGHT 1\nDATA ascii\n";
+    for (int i = 0; i < 900; ++i) {
+      pcd += std::to_string(0.2 * (i % 30)) + " " + std::to_string(0.2 * (i / 30)) + " " +
+             std::to_string(relief_m * (i * 7 % 11)) + "\n";
+    }
+    write_text(folder / name, pcd);
+    return (folder / name).string();
+  };
+  const std::string out = (folder / "map").string();
+  std::filesystem::create_directory(folder / "map");
+  for (const char* name : {"semantic_score.csv", "objects.csv", "semantic.png", "of_mine.txt"}) {
+    write_text(folder / "map" / name, "old");
+  }
+  const Result flat = run({"semantics", write_cloud("flat.pcd", 0), "--out", out});
+  EXPECT_EQ(flat.exit_code, 2);
+  EXPECT_NE(flat.err.find("in one plane"), std::string::npos) << flat.err;
+  EXPECT_EQ(std::count(flat.err.begin(), flat.err.end(), '\n'), 1) << flat.err;
+  EXPECT_EQ(read_text(folder / "map/objects.csv"), "old");
+  EXPECT_EQ(read_text(folder / "map/semantic_score.csv"), "old");
+  const Result map = run({"semantics", write_cloud("rough.pcd", 0.01), "--out", out});
+  EXPECT_EQ(map.exit_code, 0) << map.err;
+  EXPECT_NE(read_text(folder / "map/objects.csv"), "old");
+  EXPECT_NE(read_text(folder / "map/semantic.png"), "old");
+  EXPECT_FALSE(std::filesystem::exists(folder / "map/semantic_score.csv"));
+  EXPECT_EQ(read_text(folder / "map/of_mine.txt"), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "map"), {}), 4);
+}
+
 TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {
   const TemporaryFolder folder;
   const std::string junit = (folder / "junit.xml").string();

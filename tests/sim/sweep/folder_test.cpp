@@ -48,6 +48,24 @@ TEST(FileIo, AFileIsReplacedWholeOrLeftAlone) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
 }
 
+TEST(FileIo, FilesThatBelongTogetherAreReplacedTogetherOrLeftAlone) {
+  const TemporaryFolder folder;
+  write_together({{folder / "a", "1"}, {folder / "index", "1"}});
+  write_atomically(folder / "b", "1");
+  // Of a set that cannot be written whole, nothing is.
+  std::filesystem::create_directory(folder / "folder");
+  EXPECT_THROW(
+      write_together({{folder / "a", "2"}, {folder / "folder", "2"}, {folder / "index", "2"}},
+                     {folder / "b"}),
+      DiskError);
+  for (const char* name : {"a", "b", "index"}) EXPECT_EQ(read_text(folder / name), "1") << name;
+  write_together({{folder / "a", "3"}, {folder / "index", "3"}}, {folder / "b", folder / "none"});
+  EXPECT_EQ(read_text(folder / "a"), "3");
+  EXPECT_EQ(read_text(folder / "index"), "3");
+  EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
+}
+
 TEST(Flatten, NamesEveryFieldOnceInItsOrder) {
   const auto summary = ordered_json::parse(
       R"({"outcome":"succeeded","seed":3,"coverage":{"area_fraction":0.95,"t90_s":null},

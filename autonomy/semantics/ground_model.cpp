@@ -18,18 +18,32 @@ constexpr double kStiffness = 0.3;   // lambda
 constexpr int kRounds = 5;           // of weights
 constexpr int kSweeps = 24;          // of the relaxation, each round
 
-/// Height of a cell's lowest layer from its residuals, or NaN if no point has company.
+/// Height of a cell's lowest layer from its residuals, or NaN if there is none. Echoes that came by
+/// a detour lie below the ground: where there are many, a few of them are as high as each other,
+/// but never as many as the points of a surface.
 float lowest_layer(std::vector<float>& residuals) {
-  constexpr std::size_t kLooked = 64;  // lowest points that are looked at
-  const std::size_t looked = std::min(residuals.size(), kLooked);
-  std::partial_sort(residuals.begin(), residuals.begin() + static_cast<std::ptrdiff_t>(looked),
-                    residuals.end());
-  for (std::size_t i = 0; i + kCompany <= looked; ++i) {
+  constexpr float kWindow = 0.25F;       // m, of height, in which points are counted
+  constexpr std::size_t kLeast = 10;     // a tenth of the points of the fullest window
+  constexpr std::size_t kAveraged = 64;  // lowest points of the layer
+  // The fullest one is looked for in the lower half: what matters is not the crowns.
+  const std::size_t half = std::max(residuals.size() / 2, std::min(residuals.size(), kAveraged));
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(half);
+  if (middle != residuals.end()) std::nth_element(residuals.begin(), middle, residuals.end());
+  std::sort(residuals.begin(), middle);
+  std::size_t fullest = 0;
+  for (std::size_t i = 0, j = 0; i < half; ++i) {
+    while (j < half && residuals[j] - residuals[i] <= kWindow) ++j;
+    fullest = std::max(fullest, j - i);
+  }
+  for (std::size_t i = 0, end = 0; i + kCompany <= half; ++i) {
+    while (end < half && residuals[end] - residuals[i] <= kWindow) ++end;
     if (residuals[i + kCompany - 1] - residuals[i] > static_cast<float>(kSupport)) continue;
+    if (kLeast * (end - i) < fullest) continue;
     double sum = 0;
     std::size_t count = 0;
-    for (std::size_t j = i;
-         j < looked && residuals[j] - residuals[i] <= static_cast<float>(kThickness); ++j) {
+    for (std::size_t j = i; j < std::min(half, i + kAveraged) &&
+                            residuals[j] - residuals[i] <= static_cast<float>(kThickness);
+         ++j) {
       sum += static_cast<double>(residuals[j]);
       ++count;
     }
@@ -64,6 +78,44 @@ Raster lowest_layers(const WorkingCloud& cloud, double cell_m, const Surface& su
     out.values[cell] = lowest_layer(residuals);
   }
   return out;
+}
+
+/// Layers below a coarser surface that nothing of their depth goes on beside are clusters of echoes
+/// from below: they are forgotten. A hollow is wider, and so was seen by the coarser grids.
+void forget_echoes(Raster& layers) {
+  constexpr double kLeastHollow = 4;  // m^2 per metre of the cell, and one cell
+  constexpr double kWhole = 4;        // m: in cells of this size the points alone tell
+  constexpr double kStep = 0.2;       // m, between cells beside each other
+  constexpr double kSlope = 0.3;      // likewise, per metre of the cell
+  if (layers.cell_m >= kWhole) return;
+  const auto low = static_cast<float>(-(kRough + kRelief * layers.cell_m));
+  const auto step = static_cast<float>(kStep + kSlope * layers.cell_m);
+  std::vector<std::uint8_t> seen(layers.values.size(), 0);
+  std::vector<std::size_t> group;
+  for (std::size_t first = 0; first < seen.size(); ++first) {
+    if (seen[first] != 0 || !(layers.values[first] < low)) continue;
+    seen[first] = 1;
+    group.assign(1, first);
+    for (std::size_t next = 0; next < group.size(); ++next) {
+      const std::size_t i = group[next];
+      const auto width = static_cast<std::size_t>(layers.columns);
+      const int column = static_cast<int>(i % width), row = static_cast<int>(i / width);
+      for (int r = std::max(0, row - 1); r <= std::min(layers.rows - 1, row + 1); ++r) {
+        for (int c = std::max(0, column - 1); c <= std::min(layers.columns - 1, column + 1); ++c) {
+          const std::size_t j = layers.index(c, r);
+          const bool goes_on =
+              layers.values[j] < low && std::abs(layers.values[j] - layers.values[i]) <= step;
+          if (seen[j] != 0 || !goes_on) continue;
+          seen[j] = 1;
+          group.push_back(j);
+        }
+      }
+    }
+    if (static_cast<double>(group.size() - 1) * layers.cell_m >= kLeastHollow) continue;
+    for (const std::size_t i : group) {
+      layers.values[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
 }
 
 /// a + b x + c y under the lowest layers of the coarse cells, those above it counting less.
@@ -151,11 +203,12 @@ Raster fit_ground(const WorkingCloud& cloud, double cell_m) {
   const auto on_plane = [&](double x, double y) { return plane.dot(Vec3(1, x, y)); };
   Raster surface;
   for (double cell = std::max(kCoarsest, cell_m);; cell = std::max(cell / 2, cell_m)) {
-    const Raster correction = surface.values.empty()
-                                  ? relax(lowest_layers(cloud, cell, on_plane))
-                                  : relax(lowest_layers(cloud, cell, [&](double x, double y) {
-                                      return surface.interpolate(x, y);
-                                    }));
+    Raster layers = surface.values.empty() ? lowest_layers(cloud, cell, on_plane)
+                                           : lowest_layers(cloud, cell, [&](double x, double y) {
+                                               return surface.interpolate(x, y);
+                                             });
+    forget_echoes(layers);
+    const Raster correction = relax(layers);
     Raster finer(low, high, cell, 0);
     for (int row = 0; row < finer.rows; ++row) {
       for (int column = 0; column < finer.columns; ++column) {

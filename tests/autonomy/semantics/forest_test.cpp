@@ -376,5 +376,82 @@ TEST(GroundModel, FollowsHillsUnderBushesAndIgnoresEchoesFromBelow) {
   }
 }
 
+/// Errors of the ground model along a lattice, rising.
+std::vector<double> ground_errors(const std::vector<Vec3f>& points, const auto& height) {
+  const WorkingCloud cloud(points, 0.04);
+  const Raster ground = fit_ground(cloud, 0.5);
+  std::vector<double> errors;
+  for (double x = -8; x <= 8; x += 0.35) {
+    for (double y = -8; y <= 8; y += 0.35) {
+      errors.push_back(std::abs(ground.interpolate(x, y) - height(Vec2(x, y))));
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors;
+}
+
+// Echoes that came by a detour, one by one or some of them beside each other.
+TEST(GroundModel, WithstandsEchoesFromBelow) {
+  for (const double slope : {0.0, 0.5}) {
+    for (const double share : {0.001, 0.01}) {
+      for (const int cluster : {1, 5, 12}) {
+        for (const std::uint64_t seed : {1U, 2U, 3U}) {
+          Stand stand({slope * std::cos(seed), slope * std::sin(seed)}, seed);
+          AnalyticForest& cloud = stand.cloud;
+          const auto echoes = share * static_cast<double>(cloud.points.size());
+          for (int i = 0; i < echoes / cluster; ++i) {
+            const Vec2 p(cloud.random().uniform(-9, 9), cloud.random().uniform(-9, 9));
+            const Vec3 at(p.x(), p.y(), cloud.ground(p) - cloud.random().uniform(0.3, 5));
+            for (int k = 0; k < cluster; ++k) {
+              cloud.add(at + (cluster > 1 ? 0.1 : 0.0) * cloud.random().normal3());
+            }
+          }
+          const std::vector<double> errors =
+              ground_errors(cloud.points, [&](const Vec2& p) { return cloud.ground(p); });
+          EXPECT_LT(errors[errors.size() / 2], 0.02)
+              << slope << " " << share << " " << cluster << " " << seed;
+          EXPECT_LT(errors[errors.size() * 98 / 100], 0.15)
+              << slope << " " << share << " " << cluster << " " << seed;
+          const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+          EXPECT_EQ(map.count(SemanticClass::kTrunk), stand.stems.size());
+          for (const AnalyticStem& stem : stand.stems) {
+            const SemanticObject* found = stem_near(map, stem.at_breast());
+            ASSERT_NE(found, nullptr) << "radius " << stem.radius;
+            EXPECT_NEAR(found->base_z, cloud.ground(stem.foot), 0.2);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(GroundModel, FollowsDitchesAndHollowsAmongEchoesFromBelow) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    RandomStream random(seed, "ditch");
+    // A ditch of 1.2 m across a slope, its sides at 45 degrees, and a hollow of 3 m.
+    const auto depth = [](const Vec2& p) {
+      const double ditch = std::clamp(1.2 - std::abs(p.x() - 3), 0.0, 0.8);
+      const double hollow = std::max(0.0, 1 - (p - Vec2(-4, -3)).squaredNorm() / 2.25);
+      return std::max(ditch, hollow);
+    };
+    const auto height = [&](const Vec2& p) { return 0.3 * p.y() - depth(p); };
+    std::vector<Vec3f> points;
+    for (int i = 0; i < 30000; ++i) {
+      const Vec2 p(random.uniform(-9, 9), random.uniform(-9, 9));
+      const double below = i % 100 == 0 ? random.uniform(0.3, 5) : 0;
+      points.push_back(
+          Vec3(p.x(), p.y(), height(p) - below + 0.01 * random.normal()).cast<float>());
+    }
+    const std::vector<double> errors = ground_errors(points, height);
+    EXPECT_LT(errors[errors.size() / 2], 0.03) << seed;
+    EXPECT_LT(errors[errors.size() * 95 / 100], 0.3) << seed;
+    const WorkingCloud cloud(points, 0.04);
+    const Raster ground = fit_ground(cloud, 0.5);
+    for (const Vec2& p : {Vec2(3, -6), Vec2(3, 0), Vec2(3, 6), Vec2(-4, -3)}) {
+      EXPECT_NEAR(ground.interpolate(p.x(), p.y()), height(p), 0.3) << seed << " " << p.transpose();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace arex::test

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "semantics/ground_model.h"
+#include "semantics/leaning_stems.h"
 #include "semantics/slender_stems.h"
 #include "semantics/stem_detector.h"
 
@@ -23,22 +24,24 @@ constexpr double kCrownBase = 1.5;         // m above the ground, of what counts
 constexpr double kCanopyCell = 0.25;       // m
 constexpr std::size_t kTop = 5;            // the highest points may be false echoes
 
-/// The part of a stem at one height.
+/// The part of a stem at one height above its foot.
 struct Ring {
-  double height;
   Vec2 centre;
-  double radius;
+  double height, radius;
+  Vec2 lean;
+  /// As part of a stem, whose breast it is.
+  [[nodiscard]] Stem as_stem() const { return {centre, lean, radius, 0}; }
 };
 
 /// Follows a stem from its fit in one direction.
 class StemFollower {
  public:
-  StemFollower(const WorkingCloud& cloud, const ColumnIndex& index,
-               const std::vector<float>& heights)
-      : cloud_(cloud), index_(index), heights_(heights) {}
+  StemFollower(const WorkingCloud& cloud, const ColumnIndex& index)
+      : cloud_(cloud), index_(index) {}
 
   /// Rings from the given height on, `step` apart, ending where the stem's points do.
-  [[nodiscard]] std::vector<Ring> follow(const Stem& stem, double from, double step,
+  /// @param foot_z of the stem
+  [[nodiscard]] std::vector<Ring> follow(const Stem& stem, double foot_z, double from, double step,
                                          double until) const {
     std::vector<Ring> rings;
     Vec2 centre = stem.centre_at(from), lean = stem.lean;
@@ -46,16 +49,16 @@ class StemFollower {
     double missing = 0;
     for (double h = from; step > 0 ? h <= until : h >= until; h += step) {
       const double radius = stem.radius_at(h);
-      if (const auto found = fit_centre(centre, radius, h)) {
+      if (const auto found = fit_centre({centre, h, radius, lean}, foot_z)) {
         const Vec2 drift = (*found - centre) / step;
         lean += 0.2 * drift;
         centre = *found;
         missing = 0;
-        rings.push_back({h, centre, radius});
+        rings.push_back({centre, h, radius, lean});
         sure = rings.size();
       } else {
         missing += std::abs(step);
-        rings.push_back({h, centre, radius});
+        rings.push_back({centre, h, radius, lean});
       }
       if (missing > kBridge) break;
       centre += step * lean;
@@ -66,13 +69,21 @@ class StemFollower {
 
  private:
   /// The centre of a circle of known radius near a guess; nothing if too few points lie on it.
-  [[nodiscard]] std::optional<Vec2> fit_centre(const Vec2& guess, double radius, double h) const {
+  [[nodiscard]] std::optional<Vec2> fit_centre(const Ring& ring, double foot_z) const {
     constexpr std::size_t kFewest = 4;
-    std::vector<Vec2> points;
+    const Vec2& guess = ring.centre;
+    const double radius = ring.radius, slant = ring.lean.norm();
+    const Vec2 towards = slant > 0 ? Vec2(ring.lean / slant) : Vec2::UnitX();
+    const double squeeze = 1 - 1 / std::sqrt(1 + slant * slant);
+    const double reach = radius + 0.15 + slant * kStemStep;
+    std::vector<Vec2> points;  // along the axis into its level, where a leaning stem is round
     index_.within(static_cast<float>(guess.x()), static_cast<float>(guess.y()),
-                  static_cast<float>(radius + 0.15), [&](std::uint32_t i) {
-                    if (std::abs(static_cast<double>(heights_[i]) - h) > kStemStep) return;
-                    points.emplace_back(cloud_.points[i].head<2>().cast<double>());
+                  static_cast<float>(reach), [&](std::uint32_t i) {
+                    const double up =
+                        static_cast<double>(cloud_.points[i].z()) - foot_z - ring.height;
+                    if (std::abs(up) > kStemStep) return;
+                    const Vec2 out = flat(cloud_.points[i]) - up * ring.lean - guess;
+                    points.push_back(guess + out - squeeze * out.dot(towards) * towards);
                   });
     if (points.size() < kFewest) return std::nullopt;
     Vec2 centre = guess;
@@ -100,35 +111,40 @@ class StemFollower {
 
   const WorkingCloud& cloud_;
   const ColumnIndex& index_;
-  const std::vector<float>& heights_;
+};
+
+/// Where a stem or its crown is.
+struct StemPlace {
+  Vec2 at;
+  std::size_t stem;
 };
 
 /// The nearest of some places, by buckets.
 class NearestStem {
  public:
-  explicit NearestStem(const std::vector<StemEvidence>& stems, const WorkingCloud& cloud)
-      : stems_(stems),
+  NearestStem(const std::vector<StemPlace>& places, std::size_t none, const WorkingCloud& cloud)
+      : places_(places),
+        none_(none),
         buckets_(cloud.low.head<2>().cast<double>(), cloud.high.head<2>().cast<double>(),
                  kCrownReach, 0),
         lists_(buckets_.values.size()) {
-    for (std::size_t i = 0; i < stems.size(); ++i) {
-      const Vec2& c = stems[i].stem.centre;
-      lists_[buckets_.cell_of(c.x(), c.y())].push_back(i);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      lists_[buckets_.cell_of(places[i].at.x(), places[i].at.y())].push_back(i);
     }
   }
-  /// Index of the stem within kCrownReach, or the number of stems.
+  /// Index of the stem within kCrownReach, or `none`.
   [[nodiscard]] std::size_t at(const Vec2& p) const {
-    std::size_t best = stems_.size();
+    std::size_t best = none_;
     double least = kCrownReach;
     const int column = buckets_.column_of(p.x()), row = buckets_.row_of(p.y());
     for (int r = row - 1; r <= row + 1; ++r) {
       for (int c = column - 1; c <= column + 1; ++c) {
         if (!buckets_.contains(c, r)) continue;
         for (const std::size_t i : lists_[buckets_.index(c, r)]) {
-          const double distance = (stems_[i].stem.centre - p).norm();
+          const double distance = (places_[i].at - p).norm();
           if (distance < least) {
             least = distance;
-            best = i;
+            best = places_[i].stem;
           }
         }
       }
@@ -137,20 +153,30 @@ class NearestStem {
   }
 
  private:
-  const std::vector<StemEvidence>& stems_;
+  const std::vector<StemPlace>& places_;
+  std::size_t none_;
   Raster buckets_;
   std::vector<std::vector<std::size_t>> lists_;
 };
 
-void label_stem(const std::vector<Ring>& rings, SemanticClass kind, const ColumnIndex& index,
+void label_stem(const std::vector<Ring>& rings, double foot_z, SemanticClass kind,
+                const WorkingCloud& cloud, const ColumnIndex& index,
                 const std::vector<float>& heights, std::vector<SemanticClass>& labels) {
   for (const Ring& ring : rings) {
+    const Stem stem = ring.as_stem();
+    const double slant = ring.lean.norm();
+    const double reach = (ring.radius + kBark) * std::sqrt(1 + slant * slant) + slant * kStemStep;
     index.within(static_cast<float>(ring.centre.x()), static_cast<float>(ring.centre.y()),
-                 static_cast<float>(ring.radius + kBark), [&](std::uint32_t i) {
-                   const double h = static_cast<double>(heights[i]);
-                   if (std::abs(h - ring.height) > 0.5 * kStemStep + 1e-6 || h < kGroundThickness) {
+                 static_cast<float>(reach), [&](std::uint32_t i) {
+                   const double up =
+                       static_cast<double>(cloud.points[i].z()) - foot_z - ring.height;
+                   if (std::abs(up) > 0.5 * kStemStep + 1e-6 ||
+                       static_cast<double>(heights[i]) < kGroundThickness) {
                      return;
                    }
+                   const Vec2 p = flat(cloud.points[i]);
+                   if (stem.from_axis({p.x(), p.y(), kBreastHeight + up}) > ring.radius + kBark)
+                     return;
                    labels[i] = kind;
                  });
   }
@@ -179,9 +205,10 @@ struct Crown {
 bool is_part_of_wall(const Stem& stem, const WorkingCloud& cloud, const ColumnIndex& index,
                      const std::vector<float>& heights, const std::vector<bool>& on_wall) {
   constexpr double kFrom = 0.5, kTo = 2.5;  // m above the ground
+  const double reach = stem.radius + kBark + stem.lean.norm() * (kTo - kBreastHeight);
   int points = 0, of_wall = 0;
   index.within(static_cast<float>(stem.centre.x()), static_cast<float>(stem.centre.y()),
-               static_cast<float>(stem.radius + kBark), [&](std::uint32_t i) {
+               static_cast<float>(reach), [&](std::uint32_t i) {
                  const auto h = static_cast<double>(heights[i]);
                  if (h < kFrom || h > kTo) return;
                  const Vec2 p = flat(cloud.points[i]);
@@ -190,6 +217,19 @@ bool is_part_of_wall(const Stem& stem, const WorkingCloud& cloud, const ColumnIn
                  of_wall += on_wall[i];
                });
   return 2 * of_wall > points;
+}
+
+/// Whether an upright stem or a slender line is a part of a stem that leans, with leaves beside it.
+bool is_part_of_any(const StemEvidence& upright, const std::vector<StemEvidence>& leaning) {
+  constexpr double kLine = 0.15;  // m: of a thin one the line is known no better
+  const double reach = std::max(kLine, upright.stem.radius);
+  return std::any_of(leaning.begin(), leaning.end(), [&](const StemEvidence& e) {
+    for (const double h : {0.4, 0.8, 1.2, 1.6, 2.0}) {
+      const Vec2 p = upright.stem.centre_at(h);
+      if (e.stem.from_axis({p.x(), p.y(), h}) < e.stem.radius + reach) return true;
+    }
+    return false;
+  });
 }
 
 SemanticObject post_of(const StemEvidence& e, const Raster& ground, double top) {
@@ -215,9 +255,17 @@ SceneReading read_forest(const WorkingCloud& cloud, const std::vector<bool>& on_
   const std::vector<float>& heights = reading.heights;
   const ColumnIndex index(cloud.points, cloud.low, cloud.high, WorkingCloud::kCell);
   std::vector<StemEvidence> stems = find_stems(cloud, index, heights, config.stem);
+  const std::vector<StemEvidence> leaning =
+      take_leaning_stems(stems, cloud, index, heights, reading.ground, config.stem);
   std::vector<StemEvidence> slender = find_slender_stems(cloud, index, heights, config.stem);
+  constexpr double kSure = 0.5;  // confidence of one that stands for itself
+  std::erase_if(stems, [&](const StemEvidence& e) {
+    return (e.confidence() < kSure || leans_away(e.stem)) && is_part_of_any(e, leaning);
+  });
+  std::erase_if(slender, [&](const StemEvidence& e) { return is_part_of_any(e, leaning); });
   std::vector<StemEvidence> posts = take_posts(slender, stems, cloud, index, heights);
   add_slender_stems(slender, stems);
+  stems.insert(stems.end(), leaning.begin(), leaning.end());
   if (!on_wall.empty()) {
     const auto of_wall = [&](const StemEvidence& e) {
       return is_part_of_wall(e.stem, cloud, index, heights, on_wall);
@@ -226,24 +274,33 @@ SceneReading read_forest(const WorkingCloud& cloud, const std::vector<bool>& on_
     std::erase_if(posts, of_wall);
   }
 
-  const StemFollower follower(cloud, index, heights);
+  const StemFollower follower(cloud, index);
   const auto label = [&](const StemEvidence& e, SemanticClass kind) {
     constexpr double kHighest = 60;
-    std::vector<Ring> rings = follower.follow(e.stem, kBreastHeight, kStemStep, kHighest);
+    const double foot_z = foot_of_stem(e.stem, reading.ground).z();
+    std::vector<Ring> rings = follower.follow(e.stem, foot_z, kBreastHeight, kStemStep, kHighest);
     const std::vector<Ring> down =
-        follower.follow(e.stem, kBreastHeight - kStemStep, -kStemStep, 0);
+        follower.follow(e.stem, foot_z, kBreastHeight - kStemStep, -kStemStep, 0);
     rings.insert(rings.end(), down.begin(), down.end());
-    label_stem(rings, kind, index, heights, reading.labels);
+    label_stem(rings, foot_z, kind, cloud, index, heights, reading.labels);
     return rings;
   };
-  for (const StemEvidence& e : stems) label(e, SemanticClass::kTrunk);
+  std::vector<StemPlace> places;
+  for (std::size_t i = 0; i < stems.size(); ++i) {
+    const std::vector<Ring> rings = label(stems[i], SemanticClass::kTrunk);
+    places.push_back({stems[i].stem.centre, i});
+    if (!leans_away(stems[i].stem)) continue;
+    for (const Ring& ring : rings) {
+      if (ring.height > kBreastHeight) places.push_back({ring.centre, i});
+    }
+  }
   for (const StemEvidence& e : posts) {
     double top = kBreastHeight;
     for (const Ring& ring : label(e, SemanticClass::kPillar)) top = std::max(top, ring.height);
     reading.objects.push_back(post_of(e, reading.ground, top));
   }
 
-  const NearestStem nearest(stems, cloud);
+  const NearestStem nearest(places, stems.size(), cloud);
   std::vector<Crown> crowns(stems.size() + 1);
   const Raster canopy(cloud.low.head<2>().cast<double>(), cloud.high.head<2>().cast<double>(),
                       std::max(kCanopyCell, WorkingCloud::kCell), 0);
@@ -266,7 +323,7 @@ SceneReading read_forest(const WorkingCloud& cloud, const std::vector<bool>& on_
   }
   for (std::size_t i = 0; i < stems.size(); ++i) {
     const StemEvidence& e = stems[i];
-    const double ground = reading.ground.interpolate(e.stem.centre.x(), e.stem.centre.y());
+    const double ground = foot_of_stem(e.stem, reading.ground).z();
     SemanticObject object;
     object.kind = SemanticClass::kTrunk;
     object.position = {e.stem.centre.x(), e.stem.centre.y(), ground + kBreastHeight};

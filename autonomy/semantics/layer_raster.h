@@ -16,13 +16,17 @@ class LayerRaster {
   static constexpr double kLowest = 0.2;  ///< m above the ground, first layer
   static constexpr int kLayers = 64;
 
-  LayerRaster(const WorkingCloud& cloud, const std::vector<float>& heights) : low_(cloud.low) {
-    const double area = static_cast<double>(cloud.high.x() - cloud.low.x()) *
-                        static_cast<double>(cloud.high.y() - cloud.low.y());
+  /// Without points.
+  LayerRaster(const Vec3f& low, const Vec3f& high) : low_(low) {
+    const double area =
+        static_cast<double>(high.x() - low.x()) * static_cast<double>(high.y() - low.y());
     cell_ = static_cast<float>(std::max(kCell, std::sqrt(area / kMostCells)));
-    columns_ = 1 + static_cast<int>((cloud.high.x() - low_.x()) / cell_);
-    rows_ = 1 + static_cast<int>((cloud.high.y() - low_.y()) / cell_);
+    columns_ = 1 + static_cast<int>((high.x() - low_.x()) / cell_);
+    rows_ = 1 + static_cast<int>((high.y() - low_.y()) / cell_);
     masks_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
+  }
+  LayerRaster(const WorkingCloud& cloud, const std::vector<float>& heights)
+      : LayerRaster(cloud.low, cloud.high) {
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
       const double layer = (static_cast<double>(heights[i]) - kLowest) / kLayer;
       if (!(layer >= 0 && layer < kLayers)) continue;
@@ -32,6 +36,33 @@ class LayerRaster {
       masks_[at(c, r)] |= std::uint64_t{1} << static_cast<int>(layer);
     }
   }
+  [[nodiscard]] bool covers(const Vec2& p) const {
+    const Vec2 cell = (p - low_.head<2>().cast<double>()) / static_cast<double>(cell_);
+    return cell.minCoeff() >= 0 && cell.x() < columns_ && cell.y() < rows_;
+  }
+  /// @pre covers(p)
+  [[nodiscard]] std::size_t cell_of(const Vec2& p) const {
+    const Vec2 cell = (p - low_.head<2>().cast<double>()) / static_cast<double>(cell_);
+    return at(std::min(columns_ - 1, static_cast<int>(cell.x())),
+              std::min(rows_ - 1, static_cast<int>(cell.y())));
+  }
+  [[nodiscard]] int column(std::size_t cell) const {
+    return static_cast<int>(cell % static_cast<std::size_t>(columns_));
+  }
+  [[nodiscard]] int row(std::size_t cell) const {
+    return static_cast<int>(cell / static_cast<std::size_t>(columns_));
+  }
+  [[nodiscard]] bool empty(std::size_t cell) const { return masks_[cell] == 0; }
+  /// @return whether that layer was empty before; false for heights that no layer has
+  bool add(std::size_t cell, double height) {
+    const double layer = (height - kLowest) / kLayer;
+    if (!(layer >= 0 && layer < kLayers)) return false;
+    const std::uint64_t bit = std::uint64_t{1} << static_cast<int>(layer);
+    const bool fresh = (masks_[cell] & bit) == 0;
+    masks_[cell] |= bit;
+    return fresh;
+  }
+  void clear(std::size_t cell) { masks_[cell] = 0; }
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] bool empty(int c, int r) const { return masks_[at(c, r)] == 0; }

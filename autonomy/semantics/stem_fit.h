@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,9 +28,16 @@ struct Stem {
   [[nodiscard]] double radius_at(double height) const {
     return std::max(0.01, radius - taper * (height - kBreastHeight));
   }
-  /// Distance of a point (x, y, height above the ground) from the surface; negative inside.
+  /// Distance of a point (x, y, height above the ground) from the surface, in its level; negative
+  /// inside.
   [[nodiscard]] double distance(const Vec3& p) const {
     return (p.head<2>() - centre_at(p.z())).norm() - radius_at(p.z());
+  }
+  /// Distance of a point from the axis, across it.
+  [[nodiscard]] double from_axis(const Vec3& p) const {
+    const Vec2 out = p.head<2>() - centre_at(p.z());
+    const double along = out.dot(lean);
+    return std::sqrt(std::max(0.0, out.squaredNorm() - along * along / (1 + lean.squaredNorm())));
   }
 };
 

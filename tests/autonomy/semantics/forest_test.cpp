@@ -331,6 +331,100 @@ TEST(ForestMap, ACloudWithoutExtentIsNoPlace) {
   }
 }
 
+// Across its axis a stem is round, level it is not.
+void add_leaning_stem(AnalyticForest& cloud, const AnalyticStem& stem) {
+  const Vec3 along = Vec3(stem.lean.x(), stem.lean.y(), 1).normalized();
+  const Vec3 e1 = along.unitOrthogonal(), e2 = along.cross(e1);
+  const Vec3 foot(stem.foot.x(), stem.foot.y(), cloud.ground(stem.foot));
+  const double reach = 2 * stem.radius;  // its lower side comes out of the ground before its foot
+  for (double s = -reach; s < stem.height; s += cloud.spacing_m) {
+    for (double a = 0; a < stem.seen_rad; a += cloud.spacing_m / stem.radius) {
+      const double angle = stem.seen_from_rad + a;
+      const Vec3 p = foot + s * along + stem.radius * (std::cos(angle) * e1 + std::sin(angle) * e2);
+      if (p.z() > cloud.ground(p.head<2>())) cloud.add(p);
+    }
+  }
+}
+
+TEST(ForestMap, FindsStemsThatLeanByUpTo48Degrees) {
+  for (const double degrees : {15.0, 25.0, 30.0, 35.0, 40.0, 45.0, 48.0}) {
+    for (const double slope : {0.0, 0.4}) {
+      for (const std::uint64_t seed : {1U, 2U, 3U}) {
+        AnalyticForest cloud({0, slope}, seed);
+        cloud.add_ground(10);
+        std::vector<AnalyticStem> stems;
+        for (int i = 0; i < 9; ++i) {
+          AnalyticStem stem;
+          stem.foot = 6 * Vec2(i % 3 - 1, i / 3 - 1);
+          stem.radius = 0.06 + 0.03 * i;
+          const double towards = cloud.random().uniform(0, 2 * pi);
+          stem.lean = std::tan(degrees * pi / 180) * Vec2(std::cos(towards), std::sin(towards));
+          stem.seen_from_rad = cloud.random().uniform(0, 2 * pi);
+          stem.seen_rad = 1.3 * pi;
+          add_leaning_stem(cloud, stem);
+          stems.push_back(stem);
+          cloud.add_foliage({stem.foot.x() + stem.radius + 0.6, stem.foot.y(), 0.4}, 0.4, 150);
+          const Vec2 top = stem.foot + 5 * stem.lean;
+          cloud.add_foliage({top.x(), top.y(), 5 + cloud.ground(stem.foot - top)}, 1.5, 800);
+        }
+        const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+        EXPECT_LE(map.count(SemanticClass::kTrunk), stems.size() + 1) << degrees << " " << seed;
+        for (const AnalyticStem& stem : stems) {
+          const SemanticObject* found = stem_near(map, stem.at_breast());
+          ASSERT_NE(found, nullptr)
+              << degrees << " degrees, radius " << stem.radius << ", " << slope << ", " << seed;
+          EXPECT_LT((found->position.head<2>() - stem.at_breast()).norm(), 0.06) << degrees;
+          EXPECT_NEAR(found->size.x(), 2 * stem.radius, 0.025 + 0.05 * stem.radius) << degrees;
+          EXPECT_NEAR(found->base_z, cloud.ground(stem.foot), 0.15) << degrees;
+        }
+      }
+    }
+  }
+}
+
+// What leans and is none: rails and branches that begin above the ground, planks, ramps and heaps.
+TEST(ForestMap, TakesNothingElseThatLeansForAStem) {
+  for (const double slope : {0.0, 0.4}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      AnalyticForest cloud({slope, 0}, seed);
+      cloud.add_ground(10);
+      const auto random = [&](double low, double high) {
+        return cloud.random().uniform(low, high);
+      };
+      for (int i = 0; i < 9; ++i) {
+        const Vec2 p = 6 * Vec2(i % 3 - 1, i / 3 - 1) + Vec2(random(-1, 1), random(-1, 1));
+        const double towards = random(0, 2 * pi);
+        const Vec2 lean = random(0.6, 1.1) * Vec2(std::cos(towards), std::sin(towards));
+        const Vec3 foot(p.x(), p.y(), cloud.ground(p)), along(lean.x(), lean.y(), 1);
+        if (i % 3 == 0) {  // two rails above each other
+          for (double s = 0.5; s < 3.5; s += 0.03) {
+            for (const double above : {0.0, 0.4}) {
+              cloud.add(foot + Vec3(0, 0, 0.5 + above) + s * along +
+                        0.02 * cloud.random().normal3());
+            }
+          }
+        } else if (i % 3 == 1) {  // a plank or a ramp
+          const Vec3 across = Vec3(-lean.y(), lean.x(), 0).normalized();
+          const double width = i == 1 ? 0.3 : 2.5;
+          for (double s = 0; s < 3; s += 0.06) {
+            for (double w = -width / 2; w < width / 2; w += 0.06)
+              cloud.add(foot + s * along + w * across);
+          }
+        } else {  // a heap
+          for (int k = 0; k < 3000; ++k) {
+            const double r = 1.8 * std::sqrt(random(0, 1)), turn = random(0, 2 * pi);
+            cloud.add(foot + Vec3(r * std::cos(turn), r * std::sin(turn), 2 - r / 0.9));
+          }
+        }
+      }
+      SemanticConfig config;
+      config.scene = SceneKind::kForest;
+      const SemanticMap map = build_semantic_map(cloud.points, {}, config);
+      EXPECT_EQ(map.count(SemanticClass::kTrunk), 0u) << slope << " " << seed;
+    }
+  }
+}
+
 TEST(ForestMap, RefusesWhatIsTooWideForAMap) {
   RandomStream random(1, "wide");
   std::vector<Vec3f> wide;

@@ -174,6 +174,100 @@ Stem improve(const ConePoints& points, Stem stem, const StemConfig& config,
   return stem;
 }
 
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+using Mat5 = Eigen::Matrix<double, 5, 5>;
+
+/// A section that is no circle: r(angle) = radius + c cos(2 angle) + s sin(2 angle).
+struct OvalSection {
+  Vec2 centre = Vec2::Zero();  ///< off the axis
+  double radius = 0;
+  Vec2 oval = Vec2::Zero();  ///< c, s
+  /// Residual of a point off the axis, and its derivatives by the parameters, negated.
+  double residual(const Vec2& point, Vec5& row) const {
+    const Vec2 out = point - centre;
+    const double norm = std::max(1e-6, out.norm());
+    const Vec2 u = out / norm;
+    const Vec2 twice(u.x() * u.x() - u.y() * u.y(), 2 * u.x() * u.y());
+    row << u.x(), u.y(), 1, twice.x(), twice.y();
+    return norm - radius - oval.dot(twice);
+  }
+};
+
+/// Least squares with Geman-McClure weights on all that lies near a section.
+OvalSection fit_oval(std::span<const Vec2> points, double radius) {
+  constexpr std::array kScales{0.10, 0.08, 0.07, 0.06, 0.05, 0.04, 0.04, 0.03, 0.03, 0.03};  // m
+  constexpr double kRangeSigma = 0.02;  // m, of a point
+  constexpr double kOvalSigma = 0.1;    // of the radius, deviation of the prior
+  OvalSection section;
+  section.radius = radius;
+  for (const double scale : kScales) {
+    const double prior = 1 / std::pow(kOvalSigma * radius, 2);
+    Mat5 A = Mat5::Identity();
+    Vec5 b = Vec5::Zero();
+    A(3, 3) = A(4, 4) = prior;
+    b.tail<2>() = -prior * section.oval;
+    Vec5 row;
+    for (const Vec2& p : points) {
+      const double d = section.residual(p, row);
+      const double w = std::pow(1 + d * d / (scale * scale), -2) / (kRangeSigma * kRangeSigma);
+      A += w * row * row.transpose();
+      b += w * d * row;
+    }
+    const Vec5 step = A.ldlt().solve(b);
+    if (!step.allFinite()) break;
+    section.centre += step.head<2>();
+    section.radius += step[2];
+    section.oval += step.tail<2>();
+  }
+  return section;
+}
+
+/// The girth of a stem that is no cylinder, where more than half of it is seen: a circle follows
+/// one side of an oval, and the mean of its two calipers is what a forester would note.
+Stem round_out(std::span<const Vec3> points, const Stem& stem) {
+  constexpr double kLeastRadius = 0.08;  // m: of thinner ones noise makes ovals
+  constexpr double kLeastOval = 0.05;    // of the radius
+  constexpr double kMostOval = 0.25;     // likewise: an axis ratio of 5 to 3
+  constexpr double kLeastGirth = 0.5;    // of the sectors
+  constexpr double kFits = 0.03;         // m
+  constexpr double kMoreOften = 1.15;    // points on the oval, for each on the circle
+  constexpr int kSectors = 24;
+  if (stem.radius < kLeastRadius) return stem;
+  std::vector<Vec2> near;  // off the axis, as at breast height
+  for (const Vec3& p : points) {
+    const double taper = stem.radius_at(p.z()) - stem.radius;
+    const Vec2 out = p.head<2>() - stem.centre_at(p.z());
+    if (std::abs(out.norm() - stem.radius - taper) > 0.05 + 0.3 * stem.radius) continue;
+    near.push_back(out - taper * out.normalized());
+  }
+  const OvalSection oval = fit_oval(near, stem.radius);
+  const double amplitude = oval.oval.norm();
+  if (!(oval.radius > kLeastRadius) || amplitude < kLeastOval * oval.radius ||
+      amplitude > kMostOval * oval.radius || oval.centre.norm() > 0.5 * stem.radius) {
+    return stem;
+  }
+  std::array<int, kSectors> seen{};
+  int on_oval = 0, on_circle = 0;
+  Vec5 row;
+  for (const Vec2& p : near) {
+    on_circle += std::abs(p.norm() - stem.radius) < kFits;
+    if (std::abs(oval.residual(p, row)) >= kFits) continue;
+    ++on_oval;
+    const double turn = std::atan2(row[1], row[0]) / (2 * std::numbers::pi) + 0.5;
+    ++seen[static_cast<std::size_t>(std::min(kSectors - 1, static_cast<int>(turn * kSectors)))];
+  }
+  // A sector is seen if it has a third of what it has on average.
+  const auto girth = std::count_if(seen.begin(), seen.end(),
+                                   [&](int count) { return 3 * kSectors * count > on_oval; });
+  if (static_cast<double>(girth) < kLeastGirth * kSectors || on_oval < kMoreOften * on_circle) {
+    return stem;
+  }
+  Stem out = stem;
+  out.centre += oval.centre;
+  out.radius = oval.radius + amplitude * amplitude / oval.radius;  // of a circle with that girth
+  return out;
+}
+
 /// Every n-th point, at most `most` of them.
 std::vector<Vec3> thinned(std::span<const Vec3> points, std::size_t most) {
   const std::size_t stride = (points.size() + most - 1) / most;
@@ -220,6 +314,7 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& abou
     if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }
+  if (best) best->stem = round_out(all, best->stem);
   return best;
 }
 

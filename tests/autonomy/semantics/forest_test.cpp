@@ -382,6 +382,42 @@ TEST(ForestMap, FindsStemsThatLeanByUpTo48Degrees) {
   }
 }
 
+// Its girth tells an oval stem's diameter; a circle through its points follows one side of it.
+TEST(ForestMap, MeasuresTheGirthOfOvalStems) {
+  constexpr double kRatio = 1.3;  // of its axes
+  for (const double seen_rad : {1.5 * pi, 2 * pi}) {
+    std::vector<double> errors;
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      AnalyticForest cloud(Vec2::Zero(), seed);
+      cloud.spacing_m = 0.04;
+      cloud.add_ground(10);
+      for (int i = 0; i < 16; ++i) {
+        const Vec2 foot = 5 * Vec2(i % 4 - 1.5, i / 4 - 1.5);
+        const double radius = 0.08 + 0.02 * i, a = radius * std::sqrt(kRatio), b = a / kRatio;
+        const double from = cloud.random().uniform(0, 2 * pi);
+        for (double h = 0; h < 8; h += cloud.spacing_m) {
+          for (double t = from; t < from + seen_rad; t += cloud.spacing_m / radius) {
+            cloud.add({foot.x() + a * std::cos(t), foot.y() + b * std::sin(t), h});
+          }
+        }
+        cloud.add_foliage({foot.x(), foot.y(), 7}, 2, 500);
+      }
+      const SemanticMap map = build_semantic_map(cloud.points, {}, {});
+      for (int i = 0; i < 16; ++i) {
+        const SemanticObject* found = stem_near(map, 5 * Vec2(i % 4 - 1.5, i / 4 - 1.5));
+        ASSERT_NE(found, nullptr) << i << " " << seed;
+        const double radius = 0.08 + 0.02 * i, a = radius * std::sqrt(kRatio), b = a / kRatio;
+        const double girth =
+            pi * (3 * (a + b) - std::sqrt((3 * a + b) * (a + 3 * b)));  // Ramanujan
+        errors.push_back(std::abs(found->size.x() - girth / pi));
+      }
+    }
+    std::sort(errors.begin(), errors.end());
+    EXPECT_LT(errors[errors.size() / 2], seen_rad < 2 * pi ? 0.02 : 0.01) << seen_rad;
+    EXPECT_LT(errors[errors.size() * 9 / 10], seen_rad < 2 * pi ? 0.1 : 0.04) << seen_rad;
+  }
+}
+
 // What leans and is none: rails and branches that begin above the ground, planks, ramps and heaps.
 TEST(ForestMap, TakesNothingElseThatLeansForAStem) {
   for (const double slope : {0.0, 0.4}) {

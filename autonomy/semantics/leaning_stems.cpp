@@ -88,8 +88,12 @@ void along_axis(const Scene& scene, const Axis& axis, const Vec3& foot, double r
   constexpr double kPiece = 0.4;  // m along the axis
   for (double s = 0; s < length; s += kPiece) {
     const Vec3 middle = foot + (s + kPiece / 2) * axis.along;
+    const double disc = reach + kPiece / 2;
+    // So far above and below its middle a disc across the axis is in the piece, and a little more.
+    const double high = (kPiece / 2 + disc * axis.along.head<2>().norm()) / axis.along.z() + 1e-3;
     scene.index.within(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
-                       static_cast<float>(reach + kPiece / 2), [&](std::uint32_t i) {
+                       static_cast<float>(disc), static_cast<float>(middle.z() - high),
+                       static_cast<float>(middle.z() + high), [&](std::uint32_t i) {
                          const Vec3 p = scene.cloud.points[i].cast<double>();
                          const double at = (p - foot).dot(axis.along) - s;
                          if (at >= 0 && at < kPiece) visit(i, p);

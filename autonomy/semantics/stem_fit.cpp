@@ -201,7 +201,7 @@ OvalSection fit_oval(std::span<const Vec2> points, double radius) {
   OvalSection section;
   section.radius = radius;
   for (const double scale : kScales) {
-    const double prior = 1 / std::pow(kOvalSigma * radius, 2);
+    const double prior = 1 / (kOvalSigma * radius * kOvalSigma * radius);
     Mat5 A = Mat5::Identity();
     Vec5 b = Vec5::Zero();
     A(3, 3) = A(4, 4) = prior;
@@ -209,7 +209,7 @@ OvalSection fit_oval(std::span<const Vec2> points, double radius) {
     Vec5 row;
     for (const Vec2& p : points) {
       const double d = section.residual(p, row);
-      const double w = std::pow(1 + d * d / (scale * scale), -2) / (kRangeSigma * kRangeSigma);
+      const double root = kRangeSigma * (1 + d * d / (scale * scale)), w = 1 / (root * root);
       A += w * row * row.transpose();
       b += w * d * row;
     }
@@ -314,7 +314,8 @@ std::optional<StemEvidence> fit_stem(std::span<const Vec3> all, const Vec2& abou
     if (evidence.inliers < static_cast<int>(kFewestOfStem)) continue;
     if (!best || evidence.score > best->score) best = evidence;
   }
-  if (best) best->stem = round_out(all, best->stem);
+  // Of leaves a section says nothing.
+  if (best && best->confidence() >= config.min_confidence) best->stem = round_out(all, best->stem);
   return best;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -47,11 +49,21 @@ class ColumnIndex {
   /// Calls visit(index) for every point whose x, y are within `radius` of (x, y).
   template <class Visit>
   void within(float x, float y, float radius, Visit visit) const {
+    constexpr float kAny = std::numeric_limits<float>::infinity();
+    within(x, y, radius, -kAny, kAny, visit);
+  }
+  /// Of these, those from z_low up to z_high.
+  template <class Visit>
+  void within(float x, float y, float radius, float z_low, float z_high, Visit visit) const {
     const int c0 = column_of(x - radius), c1 = column_of(x + radius);
     const int r0 = row_of(y - radius), r1 = row_of(y + radius);
     for (int r = r0; r <= r1; ++r) {
       for (int c = c0; c <= c1; ++c) {
-        for (const std::uint32_t i : at(c, r)) {
+        const std::span<const std::uint32_t> cell = at(c, r);
+        const auto first = std::partition_point(
+            cell.begin(), cell.end(), [&](std::uint32_t i) { return (*points_)[i].z() < z_low; });
+        for (auto it = first; it != cell.end() && (*points_)[*it].z() <= z_high; ++it) {
+          const std::uint32_t i = *it;
           const float dx = (*points_)[i].x() - x, dy = (*points_)[i].y() - y;
           if (dx * dx + dy * dy <= radius * radius) visit(i);
         }

@@ -15,6 +15,10 @@ namespace {
 // What the IMU's buffer keeps before the newest state: the shaking is measured over it.
 constexpr Stamp kShakenFor = kNanosecondsPerSecond / 2;
 
+// For so long a camera's clock or mounting must seem off. One that is stays so; what a few odd
+// tracks make of them, close above the ground, is over within a second or two.
+constexpr Stamp kCameraOffFor = 3 * kNanosecondsPerSecond;
+
 int seen_by_both(const FeatureFrame& features) {
   return static_cast<int>(std::count_if(features.features.begin(), features.features.end(),
                                         [](const TrackedFeature& f) { return f.right; }));
@@ -230,6 +234,12 @@ void VisualEstimator::tell_once(const std::string& what, bool& told, VisualUpdat
   update.faults.push_back("visual odometry degenerate: " + what);
 }
 
+bool VisualEstimator::CameraFault::lasts(bool sure, Stamp now) {
+  if (!sure) since = -1;
+  if (sure && since < 0) since = now;
+  return sure && now - since >= kCameraOffFor && !std::exchange(told, true);
+}
+
 void VisualEstimator::watch_camera(VisualUpdate& update) {
   const VisualHealthConfig& health = config_.health;
   const CameraError off = local(nominal_, camera_);
@@ -238,15 +248,13 @@ void VisualEstimator::watch_camera(VisualUpdate& update) {
     return std::abs(value) > limit + health.sure_sigma * std::sqrt(std::max(variance, 0.0));
   };
   const double clock_s = off[kCameraTime];
-  if (!clock_told_ && sure(clock_s, health.clock_s, P(kCameraTime, kCameraTime))) {
-    clock_told_ = true;
+  if (clock_off_.lasts(sure(clock_s, health.clock_s, P(kCameraTime, kCameraTime)), stamp_)) {
     // t_d is what the IMU's stamps are ahead by.
     update.faults.push_back(fmt::format("camera clock {:.0f} ms {}", 1e3 * std::abs(clock_s),
                                         clock_s < 0 ? "ahead" : "behind"));
   }
   const double angle = off.head<3>().norm();
-  if (!mount_told_ && sure(angle, health.mount_rad, P.topLeftCorner<3, 3>().trace())) {
-    mount_told_ = true;
+  if (mount_off_.lasts(sure(angle, health.mount_rad, P.topLeftCorner<3, 3>().trace()), stamp_)) {
     update.faults.push_back(
         fmt::format("camera mount turned {:.1f} deg", angle * 180 / std::numbers::pi));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <sstream>
 #include <string>
@@ -40,7 +41,8 @@ class TruePoses {
   std::vector<Truth> truths_;
 };
 
-Flown fly(const std::string& scenario, const std::vector<std::string>& overrides) {
+Flown fly(const std::string& scenario, const std::vector<std::string>& overrides,
+          std::uint64_t seed = 1) {
   std::vector<Step> steps;
   TruePoses truth;
   Odometry before;
@@ -56,7 +58,7 @@ Flown fly(const std::string& scenario, const std::vector<std::string>& overrides
     before = now;
   };
   Flown flown{test::fly(
-      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, 1), 2, look)};
+      load_scenario(AREX_SOURCE_DIR "/scenarios/" + scenario + ".yaml", overrides, seed), 2, look)};
   // A change is told with the stamp of the first estimate of the new source, or a little later.
   constexpr double kTold_s = 0.05;
   std::istringstream events(flown.events);
@@ -116,6 +118,16 @@ TEST(VisualFlight, SaysThatItSeesNothingInTheDark) {
   EXPECT_TRUE(flown.told("sensor_fault,visual odometry degenerate: few tracks"));
   EXPECT_TRUE(flown.told("sensor_fault,visual odometry lost"));
   EXPECT_GT(flown.result.flight.others.at("vio").lost_s, 1);
+}
+
+// Close above the ground, at take-off, odd tracks made a sound camera's clock seem 30 ms off for a
+// while.
+TEST(VisualFlight, TellsNothingOfASoundCamera) {
+  const Flown flown =
+      fly("forest_small", {"odometry.source=visual_inertial", "mission.max_time_s=12"}, 12);
+  EXPECT_EQ(flown.result.outcome, Outcome::kTimedOut) << flown.result.reason;
+  EXPECT_FALSE(flown.told("camera clock"));
+  EXPECT_FALSE(flown.told("camera mount"));
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ void HealthMonitor::add_barometer(Stamp now, const BarometerSample& sample) {
 void HealthMonitor::add_battery(Stamp now, const BatterySample& sample) {
   power_.add(now, sample.stamp, std::array{sample.voltage_v, sample.current_a});
   voltage_.add(Vec3(sample.voltage_v, 0, 0));
-  pack_.add(sample);
+  pack_.add(sample, voltage_.step_rms() > config_.voltage_step_v);
 }
 
 void HealthMonitor::update(Stamp now, const Flight& flight, double dt_s) {

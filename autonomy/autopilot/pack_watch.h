@@ -16,11 +16,12 @@ class PackWatch {
   /// @param resistance_ohm of the sound battery
   explicit PackWatch(double resistance_ohm) : sound_ohm_(resistance_ohm) {}
 
-  void add(const BatterySample& sample) {
+  /// @param noisy the power sensor is: its voltage falls and rises by itself
+  void add(const BatterySample& sample, bool noisy = false) {
     const double open_v = sample.voltage_v + sound_ohm_ * sample.current_a;
     if (!has_last_) usual_open_v_ = open_v;
     const double missing_v = usual_open_v_ - open_v;
-    low_in_a_row_ = missing_v > kFall_v ? low_in_a_row_ + 1 : 0;
+    low_in_a_row_ = missing_v > kFall_v && !noisy ? low_in_a_row_ + 1 : 0;
     if (low_in_a_row_ == kLowReadings) fall_v_ = missing_v;
     usual_open_v_ -= missing_v / kUsualReadings;
     if (has_last_) {

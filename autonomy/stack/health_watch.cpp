@@ -237,16 +237,6 @@ void HealthWatch::add_mocap(Stamp now, const MocapSample& mocap) {
       .add(now, mocap.stamp, std::array{p.x(), p.y(), p.z(), v.x(), v.y(), v.z()});
 }
 
-bool HealthWatch::Lasting::holds(bool now_so, Stamp now, double for_s) {
-  if (!now_so) {
-    since = -1;
-    told = false;
-    return false;
-  }
-  if (since < 0) since = now;
-  return now - since >= from_seconds(for_s) && !std::exchange(told, true);
-}
-
 void HealthWatch::expect(Stamp now) {
   if (expected_.imu) stream("imu", kImuStream).expect(now);
   if (expected_.depth) stream("depth", kImageStream).expect(now);
@@ -271,13 +261,13 @@ std::vector<Event> HealthWatch::update(Stamp now, const Flight& flight) {
   if (faulty || jumps_about || vibration_.shakes()) imu_faulty_ = now;
   const double difference = flight.attitude_difference_rad;
   if (contradicts_.holds(flight.in_air && difference > config_.attitude_limit_rad, now,
-                         config_.lasting_s)) {
+                         from_seconds(config_.lasting_s))) {
     report(now, EventKind::kSensorFault,
            fmt::format("attitude: autopilot and odometry differ by {:.0f} degrees",
                        difference * 180 / std::numbers::pi));
   }
   if (off_path_.holds(flight.in_air && flight.off_path_m > config_.off_path_m, now,
-                      config_.lasting_s)) {
+                      from_seconds(config_.lasting_s))) {
     report(now, EventKind::kVehicleFault,
            fmt::format("out of control: {:.1f} m off its path", flight.off_path_m));
   }

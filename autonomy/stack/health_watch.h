@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "math/lasting.h"
 #include "math/noise_watch.h"
 #include "math/stream_watch.h"
 #include "math/vibration_watch.h"
@@ -69,13 +70,6 @@ class HealthWatch {
     double usual_rough = -1;
     double usual_holes = -1;
     Finding blind, rough, holes;
-  };
-  /// Something that must last before it is told.
-  struct Lasting {
-    Stamp since = -1;
-    bool told = false;
-    /// @return whether it is new
-    bool holds(bool now_so, Stamp now, double for_s);
   };
 
   void expect(Stamp now);

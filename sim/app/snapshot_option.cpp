@@ -13,9 +13,9 @@ std::vector<Stamp> snapshot_times(const std::vector<std::string>& texts, double 
   std::vector<Stamp> times;
   for (const std::string& text : texts) {
     const double time_s = parse_double(text).value_or(0);
-    const Stamp time = from_seconds(time_s);
-    const bool between_ticks = time % kNanosecondsPerTick != 0;
-    if (!(time_s > 0 && time_s < end_s) || time == 0 || between_ticks) {
+    const bool in_mission = time_s > 0 && time_s < end_s;  // any other need not be a Stamp
+    const Stamp time = in_mission ? from_seconds(time_s) : 0;
+    if (time == 0 || time % kNanosecondsPerTick != 0) {
       throw ConfigError("--snapshot: is '" + shortened(text) +
                         "', expected seconds above 0 and below " + end + ", " +
                         config_detail::format_scalar(end_s) + ", in whole milliseconds");

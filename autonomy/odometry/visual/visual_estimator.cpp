@@ -234,12 +234,6 @@ void VisualEstimator::tell_once(const std::string& what, bool& told, VisualUpdat
   update.faults.push_back("visual odometry degenerate: " + what);
 }
 
-bool VisualEstimator::CameraFault::lasts(bool sure, Stamp now) {
-  if (!sure) since = -1;
-  if (sure && since < 0) since = now;
-  return sure && now - since >= kCameraOffFor && !std::exchange(told, true);
-}
-
 void VisualEstimator::watch_camera(VisualUpdate& update) {
   const VisualHealthConfig& health = config_.health;
   const CameraError off = local(nominal_, camera_);
@@ -248,13 +242,15 @@ void VisualEstimator::watch_camera(VisualUpdate& update) {
     return std::abs(value) > limit + health.sure_sigma * std::sqrt(std::max(variance, 0.0));
   };
   const double clock_s = off[kCameraTime];
-  if (clock_off_.lasts(sure(clock_s, health.clock_s, P(kCameraTime, kCameraTime)), stamp_)) {
+  const bool clock_off = sure(clock_s, health.clock_s, P(kCameraTime, kCameraTime));
+  if (clock_off_.holds(clock_off, stamp_, kCameraOffFor) && !std::exchange(clock_told_, true)) {
     // t_d is what the IMU's stamps are ahead by.
     update.faults.push_back(fmt::format("camera clock {:.0f} ms {}", 1e3 * std::abs(clock_s),
                                         clock_s < 0 ? "ahead" : "behind"));
   }
   const double angle = off.head<3>().norm();
-  if (mount_off_.lasts(sure(angle, health.mount_rad, P.topLeftCorner<3, 3>().trace()), stamp_)) {
+  const bool mount_off = sure(angle, health.mount_rad, P.topLeftCorner<3, 3>().trace());
+  if (mount_off_.holds(mount_off, stamp_, kCameraOffFor) && !std::exchange(mount_told_, true)) {
     update.faults.push_back(
         fmt::format("camera mount turned {:.1f} deg", angle * 180 / std::numbers::pi));
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "math/lasting.h"
 #include "messages/estimates.h"
 #include "messages/odometry_need.h"
 #include "odometry/inertial/imu_buffer.h"
@@ -87,14 +88,8 @@ class VisualEstimator {
   Stamp correction_stamp_ = 0;
   int large_in_a_row_ = 0;
   int confirmations_left_ = 0;
-  bool few_told_ = false, large_told_ = false;
-  /// Something off in the camera, which is told once it has been sure for long enough.
-  struct CameraFault {
-    Stamp since = -1;  ///< sure; not now: -1
-    bool told = false;
-    bool lasts(bool sure, Stamp now);
-  };
-  CameraFault clock_off_, mount_off_;
+  Lasting clock_off_, mount_off_;
+  bool few_told_ = false, large_told_ = false, clock_told_ = false, mount_told_ = false;
 };
 
 }  // namespace arex

@@ -146,6 +146,24 @@ TEST(HealthMonitor, TellsAPackThatGivesOutAtOnceWithinATenthOfASecond) {
   EXPECT_LE(told_at, 3'100 * kNanosecondsPerTick);
 }
 
+// A sensor that jumps about shows low voltages in a row now and then; no cell has ended for that.
+TEST(HealthMonitor, TakesANoisyPowerSensorForNoPackThatGivesOut) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    HealthMonitor monitor(HealthConfig{}, kAllocation.mix(), kWeight);
+    RandomStream noise(seed, "power");
+    std::string told;
+    for (int i = 0; i < 60'000; ++i) {
+      const Stamp now = i * 5 * kNanosecondsPerTick;
+      const double noise_v = (i < 600 ? 0.01 : 2) * noise.normal();
+      monitor.add_battery(now, {now, 15.6 - 0.028 * 18 + noise_v, 18});
+      monitor.update(now, {}, 0.005);
+      for (const Event& event : monitor.take_notices()) told += event.detail + ";";
+    }
+    EXPECT_NE(told.find("power noisy"), std::string::npos) << seed;
+    EXPECT_EQ(told.find("voltage fell"), std::string::npos) << seed << ": " << told;
+  }
+}
+
 TEST(HealthMonitor, NamesASensorThatHasBeenDeadFromTheStart) {
   HealthMonitor monitor(HealthConfig{}, kAllocation.mix(), kWeight);
   RandomStream noise(1, "imu");

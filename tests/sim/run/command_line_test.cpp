@@ -7,6 +7,7 @@
 #include <sstream>
 #include <thread>
 
+#include "arex_binary.h"
 #include "support/process.h"
 #include "support/sanitized.h"
 
@@ -23,10 +24,6 @@ constexpr const char* kWaypoints = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
 
 test::Process start(const std::vector<std::string>& arguments, const TemporaryFolder& folder) {
   return {AREX_BINARY, arguments, folder.path()};
-}
-
-Result run(const std::vector<std::string>& arguments) {
-  return test::run_process(AREX_BINARY, arguments);
 }
 
 void wait_for(const std::filesystem::path& file, std::size_t bytes) {
@@ -49,7 +46,7 @@ void expect_refused(const std::string& yaml, const std::vector<std::string>& ext
   std::vector<std::string> arguments{"run", (folder / "bad.yaml").string(), "--quiet", "--out",
                                      (folder / "out").string()};
   arguments.insert(arguments.end(), extra.begin(), extra.end());
-  const Result result = run(arguments);
+  const Result result = run_arex(arguments);
   EXPECT_EQ(result.exit_code, 2) << yaml;
   EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
@@ -70,11 +67,11 @@ TEST(CommandLine, RefusesBadInputWithOneLineAndWritesNothing) {
   expect_refused("seed: 1\n", {"--require", "colisions==0"}, "did you mean 'collisions'?");
   expect_refused("seed: 1\n", {"--junit", "/does/not/exist/x.xml"}, "/does/not/exist/x.xml");
   expect_refused("seed: 1\n", {"--bag", "/does/not/exist/x.bag"}, "/does/not/exist/x.bag");
-  const Result missing = run({"run", "/does/not/exist.yaml"});
+  const Result missing = run_arex({"run", "/does/not/exist.yaml"});
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_EQ(missing.err, "/does/not/exist.yaml:1: cannot be read, expected a YAML file\n");
-  EXPECT_EQ(run({"fly"}).exit_code, 2);
-  EXPECT_EQ(run({}).exit_code, 2);
+  EXPECT_EQ(run_arex({"fly"}).exit_code, 2);
+  EXPECT_EQ(run_arex({}).exit_code, 2);
 }
 
 /// Processor time of the programs that ended so far: what a loaded host does not stretch.
@@ -90,7 +87,7 @@ double cpu_of_children_s() {
 // Exit code 2 and one printable line that names the option, within a second.
 void expect_option_refused(const std::vector<std::string>& arguments, const std::string& expected) {
   const double begin_s = cpu_of_children_s();
-  const Result result = run(arguments);
+  const Result result = run_arex(arguments);
   const double took_s = cpu_of_children_s() - begin_s;
   EXPECT_EQ(result.exit_code, 2) << expected;
   EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
@@ -124,11 +121,13 @@ TEST(CommandLine, NumbersOfOptionsAreReadAsThoseOfFiles) {
   expect_option_refused({"sweep", "s.yaml", "--out", folder, "--jobs", "010x"}, "--jobs: is '");
   // 010 is ten wherever it stands.
   for (const char* seed : {"010", "18446744073709551615"}) {
-    const Result params = run({"params", kWaypoints, "--seed", seed});
+    const Result params = run_arex({"params", kWaypoints, "--seed", seed});
     EXPECT_EQ(params.exit_code, 0) << params.err;
-    EXPECT_EQ(run({"params", kWaypoints, "--set", std::string("seed=") + seed}).out, params.out);
+    EXPECT_EQ(run_arex({"params", kWaypoints, "--set", std::string("seed=") + seed}).out,
+              params.out);
   }
-  EXPECT_NE(run({"params", kWaypoints, "--seed", "010"}).out.find("  10  "), std::string::npos);
+  EXPECT_NE(run_arex({"params", kWaypoints, "--seed", "010"}).out.find("  10  "),
+            std::string::npos);
 }
 
 // The value of a parameter as `arex params` lists it: `key  value  unit  meaning`.
@@ -158,13 +157,13 @@ TEST(CommandLine, RunSweepAndParamsMeanTheSameScenario) {
     const auto equals = setting.find('=');
     write_text(folder / "sweep.yaml", "base: base.yaml\nset: {" + setting.substr(0, equals) + ": " +
                                           setting.substr(equals + 1) + "}\n");
-    EXPECT_EQ(run({"validate", base, "--set", setting}).exit_code, 0);
-    EXPECT_EQ(run({"run", base, "--set", setting, "--quiet", "--no-report", "--out",
-                   (out / "run").string()})
+    EXPECT_EQ(run_arex({"validate", base, "--set", setting}).exit_code, 0);
+    EXPECT_EQ(run_arex({"run", base, "--set", setting, "--quiet", "--no-report", "--out",
+                        (out / "run").string()})
                   .exit_code,
               1);  // timed out
     const Result sweep =
-        run({"sweep", (folder / "sweep.yaml").string(), "--out", (out / "sweep").string()});
+        run_arex({"sweep", (folder / "sweep.yaml").string(), "--out", (out / "sweep").string()});
     EXPECT_EQ(sweep.exit_code, 0) << sweep.err;
     const std::string resolved = read_text(out / "run/resolved.yaml");
     ASSERT_FALSE(resolved.empty());
@@ -174,9 +173,9 @@ TEST(CommandLine, RunSweepAndParamsMeanTheSameScenario) {
       const auto swept = nlohmann::json::parse(read_text(flown.path() / "summary.json"));
       EXPECT_EQ(swept["trajectory_hash"], alone["trajectory_hash"]) << setting;
     }
-    EXPECT_EQ(run({"params", (out / "run/resolved.yaml").string()}).out,
-              run({"params", base, "--set", setting}).out);
-    const auto values = listed(run({"params", base, "--set", setting}).out);
+    EXPECT_EQ(run_arex({"params", (out / "run/resolved.yaml").string()}).out,
+              run_arex({"params", base, "--set", setting}).out);
+    const auto values = listed(run_arex({"params", base, "--set", setting}).out);
     EXPECT_EQ(values.at("seed"), "18446744073709551615");
     for (const auto& [key, value] : values) {
       const auto next = values.upper_bound(key);
@@ -227,17 +226,17 @@ TEST(CommandLine, RefusesHostileFilesWithinASecond) {
 }
 
 TEST(CommandLine, ListsParametersAndValidatesScenarios) {
-  const Result params = run({"params", kWaypoints, "--set", "mission.max_time_s=77"});
+  const Result params = run_arex({"params", kWaypoints, "--set", "mission.max_time_s=77"});
   EXPECT_EQ(params.exit_code, 0);
   EXPECT_NE(params.out.find("mission.max_time_s"), std::string::npos);
   EXPECT_NE(params.out.find("  77 "), std::string::npos);
-  EXPECT_EQ(run({"params"}).exit_code, 0);
-  EXPECT_EQ(run({"validate", kWaypoints}).exit_code, 0);
-  EXPECT_EQ(run({"--help"}).exit_code, 0);
+  EXPECT_EQ(run_arex({"params"}).exit_code, 0);
+  EXPECT_EQ(run_arex({"validate", kWaypoints}).exit_code, 0);
+  EXPECT_EQ(run_arex({"--help"}).exit_code, 0);
 }
 
 TEST(CommandLine, PrintsThePatternOfTheDevice) {
-  const Result result = run({"pattern", "--mode", "table", "--shots", "100"});
+  const Result result = run_arex({"pattern", "--mode", "table", "--shots", "100"});
   EXPECT_EQ(result.exit_code, 0);
   std::istringstream lines(result.out);
   std::string line;
@@ -246,13 +245,13 @@ TEST(CommandLine, PrintsThePatternOfTheDevice) {
   int count = 0;
   while (std::getline(lines, line)) ++count;
   EXPECT_EQ(count, 400);
-  EXPECT_EQ(run({"pattern", "--mode", "other"}).exit_code, 2);
+  EXPECT_EQ(run_arex({"pattern", "--mode", "other"}).exit_code, 2);
 }
 
 TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedForm) {
   const TemporaryFolder folder;
-  const Result first = run({"run", kWaypoints, "--set", "mission.max_time_s=6", "--seed", "5",
-                            "--quiet", "--out", (folder / "a").string()});
+  const Result first = run_arex({"run", kWaypoints, "--set", "mission.max_time_s=6", "--seed", "5",
+                                 "--quiet", "--out", (folder / "a").string()});
   EXPECT_EQ(first.exit_code, 1) << first.err;  // timed out
   const auto summary = nlohmann::json::parse(read_text(folder / "a/summary.json"));
   EXPECT_EQ(summary["outcome"], "timed_out");
@@ -268,8 +267,9 @@ TEST(CommandLine, ARunThatFailsStillLeavesEverythingAndRunsAgainFromItsResolvedF
        {"resolved.yaml", "truth.tum", "estimate.tum", "events.csv", "timing.csv", "report.html"}) {
     EXPECT_GT(std::filesystem::file_size(folder / "a" / file), 0u) << file;
   }
-  const Result again = run({"run", (folder / "a/resolved.yaml").string(), "--quiet", "--threads",
-                            "2", "--no-report", "--out", (folder / "b").string()});
+  const Result again =
+      run_arex({"run", (folder / "a/resolved.yaml").string(), "--quiet", "--threads", "2",
+                "--no-report", "--out", (folder / "b").string()});
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_FALSE(std::filesystem::exists(folder / "b/report.html"));
   const auto summary_again = nlohmann::json::parse(read_text(folder / "b/summary.json"));
@@ -293,11 +293,11 @@ TEST(CommandLine, RequirementsDecideTheExitCodeOfASuccessAndAreReported) {
                                      junit,
                                      "--require",
                                      "collisions==0"};
-  const Result met = run(arguments);
+  const Result met = run_arex(arguments);
   EXPECT_EQ(met.exit_code, 0) << met.err;
   EXPECT_NE(read_text(junit).find("tests=\"2\" failures=\"0\""), std::string::npos);
   arguments.insert(arguments.end(), {"--require", "distance_m>=100"});
-  const Result violated = run(arguments);
+  const Result violated = run_arex(arguments);
   EXPECT_EQ(violated.exit_code, 1);
   EXPECT_EQ(violated.err.find("arex: required distance_m>=100, but distance_m is "), 0u)
       << violated.err;
@@ -332,7 +332,7 @@ TEST(CommandLine, ReportTellsWhatIsMissingFromWhatIsNoRun) {
   std::filesystem::create_directory(folder / "empty");
   write_text(folder / "file", "");
   const auto said = [&](const char* name) {
-    const Result result = run({"report", (folder / name).string()});
+    const Result result = run_arex({"report", (folder / name).string()});
     EXPECT_EQ(result.exit_code, 2) << name;
     return result.err.substr(std::min(result.err.size(), folder.path().string().size() + 1));
   };
@@ -346,7 +346,7 @@ TEST(CommandLine, ReportTellsWhatIsMissingFromWhatIsNoRun) {
 
 TEST(CommandLine, NamesTheNearestCommandAndOption) {
   const auto said = [](const std::vector<std::string>& arguments) {
-    const Result result = run(arguments);
+    const Result result = run_arex(arguments);
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     return result.err;
@@ -369,7 +369,7 @@ TEST(CommandLine, NamesTheNearestCommandAndOption) {
 }
 
 TEST(CommandLine, SaysItsVersion) {
-  const Result result = run({"--version"});
+  const Result result = run_arex({"--version"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.out.find("arex 0."), 0u) << result.out;
   EXPECT_NE(result.out.find("compiled by g++ "), std::string::npos) << result.out;
@@ -388,7 +388,7 @@ std::vector<std::string> short_run(const TemporaryFolder& folder) {
 TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
   const TemporaryFolder folder;
   std::vector<std::string> arguments = short_run(folder);
-  const Result loud = run(arguments);
+  const Result loud = run_arex(arguments);
   EXPECT_EQ(loud.exit_code, 1);
   EXPECT_EQ(loud.out.find("timed_out: "), 0u) << loud.out;
   for (const char* figure : {"time 0.1 s", "distance ", "odometry error ", "clearance "}) {
@@ -396,7 +396,7 @@ TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
   }
   EXPECT_NE(loud.out.find((folder / "run/report.html").string()), std::string::npos) << loud.out;
   arguments.emplace_back("--quiet");
-  const Result quiet = run(arguments);
+  const Result quiet = run_arex(arguments);
   EXPECT_EQ(quiet.exit_code, 1);
   EXPECT_EQ(quiet.out, "");
   EXPECT_EQ(quiet.err.find("arex: timed_out after 0.1 s: "), 0u) << quiet.err;
@@ -406,9 +406,9 @@ TEST(CommandLine, AFailedMissionIsOneLineWhenQuietAndFiveFiguresOtherwise) {
 TEST(CommandLine, ACloudThatIsCutIsAnEvent) {
   const TemporaryFolder folder;
   const Result result =
-      run({"run", kWaypoints, "--quiet", "--no-report", "--set", "mission.max_time_s=4", "--set",
-           "odometry.source=mocap", "--set", "mapping.use_depth=false", "--set",
-           "mapping.cloud.max_points=1000", "--out", (folder / "run").string()});
+      run_arex({"run", kWaypoints, "--quiet", "--no-report", "--set", "mission.max_time_s=4",
+                "--set", "odometry.source=mocap", "--set", "mapping.use_depth=false", "--set",
+                "mapping.cloud.max_points=1000", "--out", (folder / "run").string()});
   EXPECT_EQ(result.exit_code, 1) << result.err;
   const std::string events = read_text(folder / "run/events.csv");
   const auto at = events.find(",map_full,");
@@ -417,7 +417,7 @@ TEST(CommandLine, ACloudThatIsCutIsAnEvent) {
 }
 
 TEST(CommandLine, ParametersListTheNamesThatTheyMayHave) {
-  const std::string params = run({"params"}).out;
+  const std::string params = run_arex({"params"}).out;
   const auto line_of = [&](const std::string& key) {
     const auto at = params.find("\n" + key + " ");
     return at == std::string::npos ? "" : params.substr(at + 1, params.find('\n', at + 1) - at);
@@ -430,13 +430,13 @@ TEST(CommandLine, ParametersListTheNamesThatTheyMayHave) {
 
 TEST(CommandLine, RenderRefusesMomentsOutsideOfTheFlight) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run(short_run(folder)).exit_code, 1);
+  ASSERT_EQ(run_arex(short_run(folder)).exit_code, 1);
   const auto expect = [&](const std::vector<std::string>& options, const char* file,
                           const std::string& said) {
     std::vector<std::string> arguments{"render", (folder / "run").string(), "--out",
                                        (folder / file).string()};
     arguments.insert(arguments.end(), options.begin(), options.end());
-    const Result result = run(arguments);
+    const Result result = run_arex(arguments);
     EXPECT_EQ(result.exit_code, 2) << said;
     EXPECT_NE(result.err.find(said), std::string::npos) << result.err;
     EXPECT_FALSE(std::filesystem::exists(folder / file));
@@ -455,22 +455,22 @@ TEST(CommandLine, ReportsUnfinishedRunsAndComparesSeveral) {
     write_text(folder / name / "resolved.yaml", "seed: 1\n");
   }
   const std::string a = (folder / "a").string(), b = (folder / "b").string();
-  EXPECT_EQ(run({"report", a}).out, a + "/report.html (unfinished run)\n");
+  EXPECT_EQ(run_arex({"report", a}).out, a + "/report.html (unfinished run)\n");
   EXPECT_FALSE(std::filesystem::exists(folder / "report.html"));
-  EXPECT_EQ(run({"report", a, b}).exit_code, 0);
+  EXPECT_EQ(run_arex({"report", a, b}).exit_code, 0);
   EXPECT_NE(read_text(folder / "report.html").find("href=\"./a/report.html\""), std::string::npos);
 }
 
 TEST(CommandLine, RenderRefusesWhatItCannotDraw) {
   const TemporaryFolder folder;
   const std::string name = folder.path().string();
-  EXPECT_EQ(run({"render", name, "--out", name + "/x.gif"}).err,
+  EXPECT_EQ(run_arex({"render", name, "--out", name + "/x.gif"}).err,
             "--out " + name + "/x.gif: expected FILE.png or FILE.mp4\n");
-  const Result result = run({"render", name, "--out", name + "/x.mp4"});
+  const Result result = run_arex({"render", name, "--out", name + "/x.mp4"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_EQ(result.err, name + ": holds no run, expected a run folder\n");
   write_text(folder / "resolved.yaml", "seed: 1\n");
-  EXPECT_EQ(run({"render", name, "--out", name + "/x.mp4"}).err,
+  EXPECT_EQ(run_arex({"render", name, "--out", name + "/x.mp4"}).err,
             name + "/truth.tum: holds no flight, expected two poses and more\n");
   std::filesystem::remove(folder / "resolved.yaml");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
@@ -496,7 +496,7 @@ TEST(CommandLine, EvaluatesEstimatesAgainstARunOrATrajectory) {
   write_flight(folder);
   const std::string lio = (folder / "lio.tum").string(), vio = (folder / "vio.tum").string();
   const std::string flown = (folder / "run").string(), out = (folder / "out").string();
-  const Result one = run({"evaluate", lio, flown, "--out", out});
+  const Result one = run_arex({"evaluate", lio, flown, "--out", out});
   EXPECT_EQ(one.exit_code, 0) << one.err;
   EXPECT_NE(one.out.find("position error (ATE), RMSE, m"), std::string::npos) << one.out;
   EXPECT_NE(one.out.find(out + "/evaluation.html\n"), std::string::npos) << one.out;
@@ -506,7 +506,7 @@ TEST(CommandLine, EvaluatesEstimatesAgainstARunOrATrajectory) {
   EXPECT_NEAR(estimate["ate"]["translation_m"]["rmse"].get<double>(), 0.1, 1e-9);
   EXPECT_EQ(json["options"]["delta_m"], (nlohmann::json{1.0, 10.0}));
 
-  const Result two = run(
+  const Result two = run_arex(
       {"evaluate", lio, vio, "--truth", flown, "--align", "se3", "--delta", "0.5,2", "--out", out});
   EXPECT_EQ(two.exit_code, 0) << two.err;
   const auto both = nlohmann::json::parse(read_text(folder / "out/evaluation.json"));
@@ -526,7 +526,7 @@ TEST(CommandLine, EvaluateRefusesWhatItCannotCompareAndWritesNothing) {
   const auto expect = [&](std::vector<std::string> arguments, const std::string& expected) {
     arguments.insert(arguments.begin(), "evaluate");
     arguments.insert(arguments.end(), {"--out", (folder / "out").string()});
-    const Result result = run(arguments);
+    const Result result = run_arex(arguments);
     EXPECT_EQ(result.exit_code, 2) << expected;
     EXPECT_NE(result.err.find(expected), std::string::npos) << result.err;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "arex_binary.h"
 #include "support/process.h"
 
 // What a command line gives that cannot be meant, or has no effect.
@@ -16,10 +17,6 @@ using test::TemporaryFolder;
 using test::write_text;
 
 constexpr const char* kWaypointsFile = AREX_SOURCE_DIR "/scenarios/waypoints.yaml";
-
-Result run_arex(const std::vector<std::string>& arguments) {
-  return test::run_process(AREX_BINARY, arguments);
-}
 
 void expect_one_line(const std::vector<std::string>& arguments, const std::string& line) {
   const Result result = run_arex(arguments);

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "arex_binary.h"
 #include "support/process.h"
 
 // What `arex semantics` writes, replaces and refuses.
@@ -15,23 +16,19 @@ using test::read_text;
 using test::TemporaryFolder;
 using test::write_text;
 
-Result run(const std::vector<std::string>& arguments) {
-  return test::run_process(AREX_BINARY, arguments);
-}
-
 // The world is built again, and the score is the flight's own.
 TEST(SemanticsCommand, ScoresTheSemanticMapOfARunAgainstItsWorld) {
   const TemporaryFolder folder;
   const Result flown =
-      run({"run", AREX_SOURCE_DIR "/scenarios/forest_small.yaml", "--set", "mission.max_time_s=12",
-           "--set", "depth.rate_hz=1", "--set", "scoring.tour.enabled=false", "--set",
-           "semantics.enabled=true", "--seed", "7", "--quiet", "--no-report", "--out",
-           (folder / "run").string()});
+      run_arex({"run", AREX_SOURCE_DIR "/scenarios/forest_small.yaml", "--set",
+                "mission.max_time_s=12", "--set", "depth.rate_hz=1", "--set",
+                "scoring.tour.enabled=false", "--set", "semantics.enabled=true", "--seed", "7",
+                "--quiet", "--no-report", "--out", (folder / "run").string()});
   EXPECT_EQ(flown.exit_code, 1) << flown.err;  // timed out
   const auto expected = nlohmann::json::parse(read_text(folder / "run/summary.json"))["semantic"];
   ASSERT_TRUE(expected["trunk"]["f1"].is_number());
   const Result map =
-      run({"semantics", (folder / "run").string(), "--out", (folder / "map").string()});
+      run_arex({"semantics", (folder / "run").string(), "--out", (folder / "map").string()});
   EXPECT_EQ(map.exit_code, 0) << map.err;
   EXPECT_NE(map.out.find("against the world"), std::string::npos) << map.out;
   std::istringstream lines(read_text(folder / "map/semantic_score.csv"));
@@ -51,7 +48,7 @@ TEST(SemanticsCommand, ScoresTheSemanticMapOfARunAgainstItsWorld) {
   // A cloud alone has no world, and neither has a folder whose flight is not over.
   std::filesystem::remove(folder / "run/summary.json");
   const Result unfinished =
-      run({"semantics", (folder / "run").string(), "--out", (folder / "other").string()});
+      run_arex({"semantics", (folder / "run").string(), "--out", (folder / "other").string()});
   EXPECT_EQ(unfinished.exit_code, 0) << unfinished.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "other/semantic_score.csv"));
 }
@@ -65,7 +62,7 @@ TEST(SemanticsCommand, RefusesACloudOfNoPlace) {
   }
   write_text(folder / "far.pcd", pcd);
   const std::string out = (folder / "map").string();
-  const Result result = run({"semantics", (folder / "far.pcd").string(), "--out", out});
+  const Result result = run_arex({"semantics", (folder / "far.pcd").string(), "--out", out});
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_NE(result.err.find("kilometres from each other"), std::string::npos) << result.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "map/objects.csv"));
@@ -88,13 +85,13 @@ TEST(SemanticsCommand, ASemanticMapIsReplacedAsAWhole) {
   for (const char* name : {"semantic_score.csv", "objects.csv", "semantic.png", "of_mine.txt"}) {
     write_text(folder / "map" / name, "old");
   }
-  const Result flat = run({"semantics", write_cloud("flat.pcd", 0), "--out", out});
+  const Result flat = run_arex({"semantics", write_cloud("flat.pcd", 0), "--out", out});
   EXPECT_EQ(flat.exit_code, 2);
   EXPECT_NE(flat.err.find("in one plane"), std::string::npos) << flat.err;
   EXPECT_EQ(std::count(flat.err.begin(), flat.err.end(), '\n'), 1) << flat.err;
   EXPECT_EQ(read_text(folder / "map/objects.csv"), "old");
   EXPECT_EQ(read_text(folder / "map/semantic_score.csv"), "old");
-  const Result map = run({"semantics", write_cloud("rough.pcd", 0.01), "--out", out});
+  const Result map = run_arex({"semantics", write_cloud("rough.pcd", 0.01), "--out", out});
   EXPECT_EQ(map.exit_code, 0) << map.err;
   EXPECT_NE(read_text(folder / "map/objects.csv"), "old");
   EXPECT_NE(read_text(folder / "map/semantic.png"), "old");
